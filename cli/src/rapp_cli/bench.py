@@ -1,0 +1,25 @@
+"""`./rapp bench SUBJECT`: runs one program of tests/benchmarks, which prints its table."""
+
+import argparse
+import subprocess
+import sys
+
+from rapp_cli.paths import BENCHMARKS, ROOT
+
+SUBJECTS = {
+    "interpret": "interpret.py",
+    "bridge": "bridge.py",
+}
+"""Subject to program."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of `./rapp bench`."""
+    parser.add_argument("subject", choices=sorted(SUBJECTS))
+    parser.add_argument("options", nargs=argparse.REMAINDER, help="passed on to the program")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the benchmark in the foreground; its exit status."""
+    words = [sys.executable, str(BENCHMARKS / SUBJECTS[options.subject]), *options.options]
+    return subprocess.run(words, cwd=ROOT, check=False).returncode

@@ -1,0 +1,25 @@
+"""The table of all sub-commands of `./rapp`: name, what it does, its options, its function."""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rapp_cli import bench, test
+from rapp_cli.demo import command as demo
+
+
+@dataclass(frozen=True)
+class Command:
+    """One sub-command: `run` gets the parsed options and gives the exit status."""
+
+    name: str
+    summary: str
+    add_options: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
+COMMANDS = (
+    Command("demo", "run voice-mail end to end: a person speaks, a mail arrives", demo.add_options, demo.run),
+    Command("test", "check and test everything, as continuous integration does", test.add_options, test.run),
+    Command("bench", "measure: " + ", ".join(bench.SUBJECTS), bench.add_options, bench.run),
+)

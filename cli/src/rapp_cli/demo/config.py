@@ -1,0 +1,115 @@
+"""What the demo is asked to do: one frozen object, from options and environment."""
+
+import argparse
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import platformdirs
+
+from rapp_cli.errors import UsageError
+
+KEYWORD = "e-mail"
+SENTENCE = "I would like to send a message to my daughter"
+
+
+@dataclass(frozen=True)
+class MailAccount:
+    """The real mail account to send with; its password never passes through here."""
+
+    host: str
+    port: int
+    user: str
+    security: str  # none, starttls or tls
+    password_file: Path | None
+    sender: str
+
+
+@dataclass(frozen=True)
+class DemoConfig:
+    """One run of the demo."""
+
+    folder: Path  # everything the run writes
+    command: str  # what the person says first
+    recipient: str  # the name the person says
+    message: str  # the message the person speaks
+    voice: str  # espeak-ng voice of the person
+    robot: str | None  # URL of a real robot's NAOqi, None for the simulator
+    cloud: str | None  # URL of a platform that runs already, None for one of the demo's own
+    mail: MailAccount | None  # None for the demo's own mail server
+    address: str  # the recipient's mail address
+    timeout: float  # s, for the whole story
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of `./rapp demo`; those for real equipment can be given by environment (RAPP_ROBOT, RAPP_CLOUD, ...)."""
+    parser.add_argument("--long", action="store_true", help=f"say a whole sentence, such as “{SENTENCE}”")
+    parser.add_argument("--say", metavar="TEXT", help=f"what the person says first (default “{KEYWORD}”)")
+    parser.add_argument("--recipient", default="Elizabeth", metavar="NAME", help="name of the recipient (%(default)s)")
+    parser.add_argument(
+        "--message",
+        default="please bring the medicine and some water on Monday morning",
+        metavar="TEXT",
+        help="the spoken message (“%(default)s”)",
+    )
+    parser.add_argument("--voice", default="en-us+m3", help="espeak-ng voice of the person (%(default)s)")
+    parser.add_argument("--folder", type=Path, help="where the run writes (default: a new folder among your data)")
+    parser.add_argument("--timeout", type=float, default=180.0, help="seconds for the whole story (%(default)s)")
+    real = parser.add_argument_group("real equipment")
+    real.add_argument("--robot", metavar="URL", help="NAOqi of a real NAO, such as tcp://nao.local:9559 [RAPP_ROBOT]")
+    real.add_argument("--cloud", metavar="URL", help="a running platform [RAPP_CLOUD; RAPP_TOKEN_FILE, RAPP_ROOT_FILE]")
+    real.add_argument("--smtp-host", help="a real mail account's server [RAPP_SMTP_HOST]")
+    real.add_argument("--smtp-port", type=int, help="its port (587) [RAPP_SMTP_PORT]")
+    real.add_argument("--smtp-user", help="its user [RAPP_SMTP_USER]; the password by RAPP_SMTP_PASSWORD or the file")
+    real.add_argument("--smtp-security", choices=("starttls", "tls", "none"), help="(starttls) [RAPP_SMTP_SECURITY]")
+    real.add_argument("--smtp-password-file", type=Path, help="file that holds the password [RAPP_SMTP_PASSWORD_FILE]")
+    real.add_argument("--mail-from", metavar="ADDRESS", help="the sender's address [RAPP_MAIL_FROM]")
+    real.add_argument("--address", help="the recipient's mail address (default: one on the demo's own mail server)")
+
+
+def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> DemoConfig:
+    """Build the configuration; raises UsageError when options contradict each other."""
+    account = _mail_account(options, env)
+    if account and not options.address:
+        raise UsageError("cannot use a real mail account without a real recipient: give --address NAME@DOMAIN")
+    if not options.recipient.strip() or not options.message.strip():
+        raise UsageError("cannot send a voice-mail without --recipient and --message")
+    return DemoConfig(
+        folder=(options.folder or _new_folder()).resolve(),
+        command=options.say or (SENTENCE if options.long else KEYWORD),
+        recipient=options.recipient,
+        message=options.message,
+        voice=options.voice,
+        robot=options.robot or env.get("RAPP_ROBOT"),
+        cloud=options.cloud or env.get("RAPP_CLOUD"),
+        mail=account,
+        address=options.address or f"{_mailbox(options.recipient)}@home.example",
+        timeout=options.timeout,
+    )
+
+
+def _mail_account(options: argparse.Namespace, env: Mapping[str, str]) -> MailAccount | None:
+    host = options.smtp_host or env.get("RAPP_SMTP_HOST")
+    if not host:
+        return None
+    password_file = options.smtp_password_file or env.get("RAPP_SMTP_PASSWORD_FILE")
+    user = options.smtp_user or env.get("RAPP_SMTP_USER", "")
+    return MailAccount(
+        host=host,
+        port=options.smtp_port or int(env.get("RAPP_SMTP_PORT", "587")),
+        user=user,
+        security=options.smtp_security or env.get("RAPP_SMTP_SECURITY", "starttls"),
+        password_file=Path(password_file) if password_file else None,
+        sender=options.mail_from or env.get("RAPP_MAIL_FROM", user),
+    )
+
+
+def _mailbox(name: str) -> str:
+    return "".join(c if c.isascii() and c.isalnum() else "." for c in name.lower()).strip(".") or "recipient"
+
+
+def _new_folder() -> Path:
+    runs = Path(platformdirs.user_data_dir("rapp")) / "demo"
+    return runs / f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"

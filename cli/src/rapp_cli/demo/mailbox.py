@@ -1,0 +1,55 @@
+"""The mail that arrives: waits for it in the Maildir, takes out the spoken message, hears its words again."""
+
+import asyncio
+import email
+from collections.abc import Sequence
+from dataclasses import dataclass
+from email.policy import default
+from pathlib import Path
+
+import soundfile
+from pocketsphinx import Decoder
+
+
+@dataclass(frozen=True)
+class Delivered:
+    """One delivered mail: its file, and its recording saved beside the run."""
+
+    mail: Path
+    recording: Path
+    recipient: str
+
+
+async def wait_for_mail(maildir: Path, recordings: Path) -> Delivered:
+    """Wait until a mail with an audio attachment lies in the Maildir; saves the attachment into `recordings`."""
+    while True:
+        for path in sorted(maildir.glob("**/new/*")):
+            message = email.message_from_bytes(path.read_bytes(), policy=default)
+            for part in message.iter_attachments():
+                if part.get_content_type() in ("audio/ogg", "application/ogg"):
+                    recordings.mkdir(parents=True, exist_ok=True)
+                    recording = recordings / (Path(part.get_filename() or "").name or "message.ogg")
+                    recording.write_bytes(part.get_content())
+                    return Delivered(path, recording, str(message["To"]))
+        await asyncio.sleep(0.1)
+
+
+def words_heard(said: str, heard: str) -> Sequence[str]:
+    """Those words of `said`, longer than two letters, that occur in `heard`."""
+    present = set(_words(heard))
+    return [word for word in _words(said) if word in present]
+
+
+def _words(text: str) -> list[str]:
+    return [w for w in "".join(c.lower() if c.isalnum() else " " for c in text).split() if len(w) > 2]
+
+
+def transcribe(recording: Path) -> str:
+    """Recognise the words of a 16 kHz mono recording with pocketsphinx's general English model."""
+    samples, rate = soundfile.read(recording, dtype="int16")
+    decoder = Decoder(samprate=rate, loglevel="FATAL")
+    decoder.start_utt()
+    decoder.process_raw(samples.tobytes(), full_utt=True)
+    decoder.end_utt()
+    hypothesis = decoder.hyp()
+    return hypothesis.hypstr if hypothesis else ""

@@ -1,0 +1,58 @@
+"""The simulated person: hears the robot, speaks into its virtual microphone with a voice of their own (SimWorld)."""
+
+import asyncio
+import os
+from collections.abc import Callable
+
+os.environ.setdefault("QI_LOG_LEVEL", "1")  # libqi reads it when loaded, and logs on stdout
+
+import qi
+
+from rapp_cli.errors import CommandError
+
+CALL_TIMEOUT = 60_000  # ms, for a whole spoken message
+
+
+class Person:
+    """Somebody in the robot's room; `on_speech` is told what they say as they begin."""
+
+    def __init__(self, robot: str, voice: str, on_speech: Callable[[str], None]) -> None:
+        self._robot = robot
+        self._voice = voice
+        self._on_speech = on_speech
+        self._heard: asyncio.Queue[str] = asyncio.Queue(maxsize=100)
+        self._session = qi.Session()
+        self._world: qi.Object | None = None
+
+    async def enter(self) -> None:
+        """Come into the room: from now on the robot is heard. Raises CommandError when there is no simulator."""
+        loop = asyncio.get_running_loop()
+        try:
+            await asyncio.to_thread(lambda: self._session.connect(self._robot, _async=True).value(5_000))
+            self._world = await asyncio.to_thread(lambda: self._session.service("SimWorld"))
+        except RuntimeError as error:
+            raise CommandError(
+                f"cannot reach the simulated room at {self._robot}: {error}; start nao_sim there"
+            ) from error
+        assert self._world is not None
+        self._world.robotSaid.connect(lambda text: loop.call_soon_threadsafe(self._hear, text))
+
+    def _hear(self, text: str) -> None:
+        if self._heard.full():
+            self._heard.get_nowait()
+        self._heard.put_nowait(text)
+
+    async def next_heard(self) -> str:
+        """Wait for the next text the robot has finished saying."""
+        return await self._heard.get()
+
+    async def say(self, text: str) -> None:
+        """Say a text; returns when it has been spoken."""
+        assert self._world is not None
+        self._on_speech(text)
+        world, voice = self._world, self._voice
+        await asyncio.to_thread(lambda: world.personSay(text, voice, _async=True).value(CALL_TIMEOUT))
+
+    async def leave(self) -> None:
+        """Go: the robot is heard no longer."""
+        await asyncio.to_thread(self._session.close)

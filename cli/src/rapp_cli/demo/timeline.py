@@ -1,0 +1,79 @@
+"""The live timeline: what the agents publish on /core_agent/state, read over rosbridge, as lines on the terminal."""
+
+import asyncio
+import json
+import sys
+import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any, TextIO
+
+from tornado.websocket import websocket_connect
+
+KINDS = ("entered", "left", "failed", "said", "heard", "message")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of the timeline; `kind` is one of KINDS."""
+
+    agent: str
+    machine: str
+    state: str
+    kind: str
+    detail: str
+
+
+class Timeline:
+    """Prints entries with the seconds since the start, and keeps them for a look back."""
+
+    def __init__(self, out: TextIO = sys.stdout) -> None:
+        self.entries: list[Entry] = []
+        self._out = out
+        self._began = time.monotonic()
+        self._changed = asyncio.Condition()
+
+    async def add(self, entry: Entry) -> None:
+        """Keep one entry, print it unless it is a mere leaving, wake those who wait."""
+        self.entries.append(entry)
+        if entry.kind != "left":
+            self._print(entry)
+        async with self._changed:
+            self._changed.notify_all()
+
+    def _print(self, entry: Entry) -> None:
+        what = {
+            "entered": entry.detail,
+            "failed": f"FAILED {entry.detail}",
+            "said": f"says  “{entry.detail}”",
+            "heard": f"hears “{entry.detail}”",
+            "message": entry.detail,
+        }[entry.kind]
+        seconds = time.monotonic() - self._began
+        print(f"{seconds:7.2f} s  {entry.agent:<8} {entry.state:<22} {what}".rstrip(), file=self._out, flush=True)
+
+    async def wait_for(self, agent: str, kind: str, state: str, after: int = 0) -> int:
+        """Wait for an entry at or after index `after`; gives the index behind it."""
+        async with self._changed:
+            while True:
+                for index in range(after, len(self.entries)):
+                    entry = self.entries[index]
+                    if (entry.agent, entry.kind, entry.state) == (agent, kind, state):
+                        return index + 1
+                after = len(self.entries)
+                await self._changed.wait()
+
+
+async def follow(bridge: str) -> AsyncIterator[Entry]:
+    """Subscribe to the agents' states at a rosbridge (ws://host:port); yields entries until the bridge leaves."""
+    socket = await websocket_connect(bridge, connect_timeout=5)
+    topic = {"topic": "/core_agent/state", "type": "rapp_msgs/AgentState", "queue_length": 1000}
+    await socket.write_message(json.dumps({"op": "subscribe", **topic}))
+    try:
+        while (text := await socket.read_message()) is not None:
+            message: dict[str, Any] = json.loads(text)
+            if message.get("op") == "publish":
+                m = message["msg"]
+                yield Entry(m["agent"], m["machine"], m["state"], KINDS[m["kind"]], m["detail"])
+    finally:
+        socket.close()
