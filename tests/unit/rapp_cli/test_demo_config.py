@@ -1,0 +1,48 @@
+"""What the demo reads from options and environment."""
+
+import argparse
+from pathlib import Path
+
+import pytest
+from rapp_cli.demo.config import KEYWORD, SENTENCE, DemoConfig, add_options, read
+from rapp_cli.errors import UsageError
+
+
+def config(*words: str, env: dict[str, str] | None = None) -> DemoConfig:
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    return read(parser.parse_args(words), env or {})
+
+
+def test_the_keyword_is_said_by_default_and_a_sentence_with_long() -> None:
+    assert config().command == KEYWORD
+    assert config("--long").command == SENTENCE
+    assert config("--long", "--say", "please write to my son").command == "please write to my son"
+
+
+def test_two_runs_write_into_folders_of_their_own(tmp_path: Path) -> None:
+    assert config("--folder", str(tmp_path)).folder == tmp_path
+    assert "demo" in config().folder.parts
+
+
+def test_a_recipient_of_any_spelling_gets_a_mail_address() -> None:
+    assert config("--recipient", "Doctor Nowak").address == "doctor.nowak@home.example"
+    assert config("--recipient", "Żaneta").address.endswith("@home.example")
+
+
+def test_a_real_account_needs_a_real_recipient() -> None:
+    with pytest.raises(UsageError, match="--address"):
+        config("--smtp-host", "smtp.example.org")
+
+
+def test_a_real_account_comes_from_options_before_environment() -> None:
+    env = {"RAPP_SMTP_HOST": "env.example", "RAPP_SMTP_USER": "me@env.example", "RAPP_SMTP_PORT": "465"}
+    account = config("--smtp-host", "option.example", "--address", "you@x.example", env=env).mail
+    assert account is not None
+    assert (account.host, account.port, account.user) == ("option.example", 465, "me@env.example")
+    assert (account.security, account.sender) == ("starttls", "me@env.example")
+
+
+def test_nothing_to_say_is_refused() -> None:
+    with pytest.raises(UsageError, match="--message"):
+        config("--message", "  ")
