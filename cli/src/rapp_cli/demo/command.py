@@ -42,7 +42,7 @@ async def _demo(config: DemoConfig) -> int:
     config.folder.mkdir(parents=True, exist_ok=True)
     print(f"rapp demo: everything of this run is in {config.folder}", flush=True)
     async with running_system(config) as system:
-        timeline = Timeline()
+        timeline = Timeline(record=config.folder / "timeline.jsonl")
         following = asyncio.create_task(_show(system.bridge, timeline))
         try:
             async with asyncio.timeout(config.timeout):

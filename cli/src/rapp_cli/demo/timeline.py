@@ -5,7 +5,8 @@ import json
 import sys
 import time
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, TextIO
 
 from tornado.websocket import websocket_connect
@@ -25,17 +26,21 @@ class Entry:
 
 
 class Timeline:
-    """Prints entries with the seconds since the start, and keeps them for a look back."""
+    """Prints entries with the seconds since the start, keeps them, and records them as JSON lines when given a file."""
 
-    def __init__(self, out: TextIO = sys.stdout) -> None:
+    def __init__(self, out: TextIO = sys.stdout, record: Path | None = None) -> None:
         self.entries: list[Entry] = []
         self._out = out
+        self._record = record
         self._began = time.monotonic()
         self._changed = asyncio.Condition()
 
     async def add(self, entry: Entry) -> None:
         """Keep one entry, print it unless it is a mere leaving, wake those who wait."""
         self.entries.append(entry)
+        if self._record is not None:
+            with self._record.open("a") as record:
+                record.write(json.dumps(asdict(entry)) + "\n")
         if entry.kind != "left":
             self._print(entry)
         async with self._changed:
