@@ -1,0 +1,69 @@
+"""Where a download's bytes go: counted, bounded, and stopped when nobody wants them any more."""
+
+from collections.abc import Callable
+
+from rapp_hop.errors import HopError, Invalid
+
+Writer = Callable[[bytes], object]
+Progress = Callable[[int, int | None], None]  # bytes so far, bytes announced (None: not announced)
+
+
+class Sink:
+    """Receives one response's header lines and pieces; `check()` afterwards tells what went wrong."""
+
+    def __init__(self, url: str, write: Writer, limit: int, on_progress: Progress | None) -> None:
+        self.received = 0  # bytes
+        self._url = url
+        self._write = write
+        self._limit = limit
+        self._on_progress = on_progress
+        self._announced: int | None = None
+        self._status = 0
+        self._wrong: HopError | OSError | None = None
+        self._stopped = False
+
+    def header(self, line: str) -> None:
+        """Take one header line of the response (the status line first)."""
+        if line.startswith("HTTP/"):
+            words = line.split()
+            self._status = int(words[1]) if len(words) > 1 and words[1].isdecimal() else 0
+        name, _, value = line.partition(":")
+        if name.strip().lower() == "content-length" and value.strip().isdecimal():
+            self._announced = int(value)
+            if self._announced > self._limit:
+                self._too_long()
+
+    def data(self, piece: bytes) -> None:
+        """Take one piece of the body.
+
+        What is not wanted is dropped in silence: the client's own bound on size and time ends the transfer.
+        """
+        if self._status != 200 or self._wrong is not None or self._stopped:
+            return
+        self.received += len(piece)
+        if self.received > self._limit:
+            self._too_long()
+            return
+        try:
+            self._write(piece)
+        except OSError as error:
+            self._wrong = error
+            return
+        if self._on_progress is not None:
+            self._on_progress(self.received, self._announced)
+
+    def stop(self) -> None:
+        """Want no more: nothing is written from now on."""
+        self._stopped = True
+
+    def check(self) -> None:
+        """Raise what ended the transfer early on this side, if anything did.
+
+        :raises Invalid: more bytes than allowed
+        :raises OSError: the writer's own error, such as a full disk
+        """
+        if self._wrong is not None:
+            raise self._wrong
+
+    def _too_long(self) -> None:
+        self._wrong = Invalid(f"cannot accept {self._url}: it is longer than {self._limit} bytes")
