@@ -17,7 +17,6 @@ from rapp_bridge.services import Calls, Offers
 from rapp_bridge.session import Session
 from rapp_bridge.topics import Topics
 
-
 BACKLOG = 128  # callers that may connect to a client's service at once; rospy's own 5 makes the sixth wait 1 s
 
 
@@ -35,7 +34,7 @@ async def _serve(config: Config) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stop.set)
     await loop.run_in_executor(None, lambda: rospy.init_node("rosbridge", disable_signals=True, disable_rosout=True))
-    tcpros_base._tcpros_server.tcp_server.server_sock.listen(BACKLOG)
+    tcpros_base._tcpros_server.tcp_ros_server.server_sock.listen(BACKLOG)
     topics, calls, offers = Topics(), Calls(config), Offers(config)
     sockets = bind_sockets(config.port, config.address)
     server = HTTPServer(application(config, lambda client: Session(client, topics, calls, offers)))

@@ -25,9 +25,7 @@ def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
     default = Config()
     parser = argparse.ArgumentParser(prog="rosbridge", description="rosbridge v2 WebSocket server")
     parser.add_argument("--address", default=default.address, help="where to listen (%(default)s)")
-    parser.add_argument(
-        "--port", type=int, default=int(env.get("RAPP_BRIDGE_PORT", default.port)), help="0: any free one"
-    )
+    parser.add_argument("--port", type=int, default=int(env.get("RAPP_BRIDGE_PORT", default.port)), help="0: any free one")
     parser.add_argument("--call-timeout", type=float, default=default.call_timeout, help="seconds (%(default)s)")
     options = parser.parse_args(words)
     return Config(address=options.address, port=options.port, call_timeout=options.call_timeout)

@@ -7,7 +7,7 @@ import base64
 import binascii
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import cache
 from typing import Any
 
@@ -57,9 +57,9 @@ def arguments(values: list[Any] | dict[str, Any], cls: Any) -> Any:
 
 
 @cache
-def writer(cls: Any) -> ToJson:
+def writer(cls: Hashable) -> ToJson:
     """The compiled converter of one message class, to JSON objects; requests and responses of services included."""
-    fields = [(name, _field_writer(kind)) for name, kind in zip(cls.__slots__, cls._slot_types, strict=True)]
+    fields = [(name, _field_writer(kind)) for name, kind in zip(cls.__slots__, cls._slot_types, strict=True)]  # type: ignore[attr-defined]
     return lambda message: {name: write(getattr(message, name)) for name, write in fields}
 
 

@@ -4,6 +4,7 @@ Operations and field types as in ROSBRIDGE_PROTOCOL.md of rosbridge_suite (branc
 """
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -179,7 +180,7 @@ class _Reader:
         return self._fields.get(name)
 
 
-_DECODERS = {
+_DECODERS: dict[str, Callable[[_Reader], Message]] = {
     "advertise": lambda r: Advertise(
         r.text("topic"), r.text("type"), r.id(), r.flag("latch", False), r.count("queue_size", 100)
     ),

@@ -102,7 +102,7 @@ class Calls:
             timer.cancel()
         with self._lock:
             self._idle[name].append(proxy)
-        return writer(type(response))(response)
+        return writer(response.__class__)(response)
 
     @staticmethod
     def _hang_up(proxy: Any, late: threading.Event) -> None:

@@ -154,7 +154,7 @@ class Topics:
             entry = self._subscribed.get(topic)
             wish = entry.wishes.get(client) if entry else None
         if wish is not None:
-            client.offer(topic, publication(topic, writer(type(message))(message)), wish.queue_length)
+            client.offer(topic, publication(topic, writer(message.__class__)(message)), wish.queue_length)
 
     def _deliver(self, topic: str, text: str) -> None:
         now = time.monotonic()
