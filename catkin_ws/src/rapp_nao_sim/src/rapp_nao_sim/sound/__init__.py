@@ -1,0 +1,1 @@
+"""Sound in the simulated room: one sample clock, a microphone, a loudspeaker, people's voices, noise."""

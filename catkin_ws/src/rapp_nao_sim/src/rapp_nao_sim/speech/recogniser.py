@@ -1,0 +1,97 @@
+"""Recognition of one spoken word or phrase out of a vocabulary, with a probability and so with rejection of other words.
+
+The probability is a logistic function of the likelihood ratio between the vocabulary's grammar and a free phone loop: a word that
+is not in the vocabulary is explained better by the loop. The weights were fitted on 20 words, 4 voices and 4 noise levels.
+"""
+
+import functools
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from pocketsphinx import Decoder, get_model_path
+
+from rapp_nao_sim.sound.room import Block
+from rapp_nao_sim.sound.synthesis import RATE
+from rapp_nao_sim.speech.pronunciation import pronounce
+
+WEIGHTS = (-0.154, 5.628, 7.037, -6.528)  # of likelihood ratio per frame, ratio, frames, and 1
+LANGUAGE_WEIGHT = 1.0  # pocketsphinx's default of 6.5 spoils the ratio
+SCALE = 1024.0  # of pocketsphinx's scores, which are log likelihoods shifted by 10 bits
+SHORTEST = 8  # frames of 10 ms; anything shorter counts as this long
+FILLERS = frozenset(("SIL", "<sil>", "[NOISE]", "[SPEECH]", "+NSN+", "+SPN+", "(NULL)", "NULL"))
+PAD = 0.2  # s of noise around the sound: the decoder's front end has to settle
+
+
+def spoken_words(phrase: str) -> list[str]:
+    """The words of a phrase as they are spoken, in lower case; hyphens within a word stay: "E-Mail" is "e-mail"."""
+    return re.findall(r"[^\W_]+(?:['\-][^\W_]+)*", phrase.lower())
+
+
+class Recogniser:
+    """One vocabulary at a time; words outside the dictionary get their pronunciation from espeak-ng."""
+
+    def __init__(self) -> None:
+        self._decoder = Decoder(samprate=RATE, lm=None, lw=LANGUAGE_WEIGHT, loglevel="FATAL")
+        self._decoder.add_allphone_file("phones", get_model_path("en-us/en-us-phone.lm.bin"))
+        self._phrases: dict[tuple[str, ...], str] = {}
+
+    def set_vocabulary(self, phrases: Sequence[str]) -> None:
+        """Listen for these phrases from now on; answers use the caller's spelling."""
+        spoken = {tuple(spoken_words(phrase)): phrase for phrase in phrases}
+        spoken.pop((), None)
+        for word in {word for words in spoken for word in words}:
+            self._learn(word)
+        self._phrases = spoken
+        if spoken:
+            alternatives = " | ".join(" ".join(words) for words in spoken)
+            self._decoder.add_jsgf_string("words", f"#JSGF V1.0; grammar g; public <w> = {alternatives} ;")
+
+    def recognise(self, samples: Block) -> list[tuple[str, float]]:
+        """Best phrase and its probability, [] when nothing like speech was in the sound."""
+        if not self._phrases:
+            return []
+        noise = np.random.default_rng(1).normal(0, max(1.0, _floor(samples)), round(PAD * RATE))
+        padding = np.clip(noise, -32768, 32767).astype(np.int16)
+        sound = np.concatenate([padding, samples, padding]).tobytes()
+        words, ratio_words, frames = self._decode("words", sound)
+        if words is None:
+            return []
+        _, ratio_phones, _ = self._decode("phones", sound)
+        phrase = self._phrases.get(tuple(words.lower().split()))
+        return [(phrase, _probability(ratio_words - ratio_phones, frames))] if phrase is not None else []
+
+    def _decode(self, search: str, sound: bytes) -> tuple[str | None, float, int]:
+        decoder = self._decoder
+        decoder.activate_search(search)
+        decoder.start_utt()
+        decoder.process_raw(sound, full_utt=True)
+        decoder.end_utt()
+        hypothesis = decoder.hyp()
+        if hypothesis is None or hypothesis.score <= 0:
+            return None, -math.inf, 0
+        frames = sum(s.end_frame - s.start_frame + 1 for s in decoder.seg() or () if s.word not in FILLERS)
+        return re.sub(r"\(\d+\)", "", hypothesis.hypstr), SCALE * math.log(hypothesis.score), frames
+
+    @functools.cache  # noqa: B019 - one recogniser lives as long as its process
+    def _learn(self, word: str) -> None:
+        if self._decoder.lookup_word(word) is None:
+            phones = pronounce(word)
+            if not phones:
+                raise ValueError(f"cannot learn to hear {word!r}: espeak-ng gives no pronunciation")
+            self._decoder.add_word(word, phones, True)
+
+
+def _floor(samples: Block) -> float:
+    """Noise floor of a sound: the level of its quietest tenth."""
+    blocks = samples[: len(samples) // 160 * 160].reshape(-1, 160).astype(np.float64)
+    levels = np.sqrt((blocks**2).mean(axis=1)) if len(blocks) else np.ones(1)
+    return float(np.quantile(levels, 0.1))
+
+
+def _probability(ratio: float, frames: int) -> float:
+    length = max(frames, SHORTEST)
+    a, b, c, bias = WEIGHTS
+    x = a * 10 * ratio / length + b * ratio / 50 + c * length / 50 + bias
+    return 1 / (1 + math.exp(-max(-50.0, min(50.0, x))))
