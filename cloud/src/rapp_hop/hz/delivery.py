@@ -1,0 +1,153 @@
+"""From the store onto the robot: list, download, verify, install; asynchronous, for who lives in an asyncio loop.
+
+The verifying half (`trust`) and the disk half (`install`) block, so they run in a thread, and ask the loop's client for
+bytes.
+"""
+
+import asyncio
+import concurrent.futures
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rapp_hop.client import HopClient
+from rapp_hop.errors import Refused, Unreachable
+from rapp_hop.hz.install import Installed, PackageFile, RappFolder, install
+from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.tar import Limits
+from rapp_hop.hz.trust import TrustedStore, newest
+from rapp_hop.streaming import Progress, Writer
+
+OnPhase = Callable[[str, dict[str, Any]], None]  # "downloading" | "verified" | "installed", and details
+
+
+@dataclass(frozen=True)
+class DeliveryLimits:
+    """Bounds of a delivery."""
+
+    metadata_timeout: float = 10.0  # seconds per metadata file
+    package_timeout: float = 120.0  # seconds per package
+    package: Limits = field(default_factory=Limits)
+
+
+class Delivery:
+    """Brings RApps from one store into one folder."""
+
+    def __init__(self, client: HopClient, root: bytes, home: Path, limits: DeliveryLimits | None = None) -> None:
+        """Prepare; touches neither disk nor network.
+
+        :param client: of the platform whose store it is (`<base_url>/tuf`)
+        :param root: the trusted root.json that came with the robot
+        :param home: the robot's data folder: packages go to `rapps/`, what was seen of the store to `trust/`
+        """
+        self._client = client
+        self._root = root
+        self._home = home
+        self._limits = limits or DeliveryLimits()
+        self.folder = RappFolder(home / "rapps")
+
+    async def install(self, name: str, version: str | None = None, on_phase: OnPhase | None = None) -> Installed:
+        """Install a RApp, the newest version when none is named; one that is there already is not fetched again.
+
+        Cancelling ends the download and waits for the thread, so that nothing half done goes on.
+
+        :param on_phase: called in this loop
+        :raises Untrusted: the store cannot be believed (`.attack` says why)
+        :raises Invalid: the package is not right
+        :raises Refused: no such RApp, or the disk is unwilling
+        :raises Unreachable: try again later
+        """
+        loop = asyncio.get_running_loop()
+        transport = _LoopTransport(self._client, loop, self._limits)
+
+        def tell(phase: str, **details: Any) -> None:
+            if on_phase is not None:
+                loop.call_soon_threadsafe(on_phase, phase, details)
+
+        work = asyncio.ensure_future(asyncio.to_thread(self._install, transport, name, version, tell))
+        try:
+            return await asyncio.shield(work)
+        except asyncio.CancelledError:
+            transport.cancel()
+            await asyncio.wait([work])
+            work.exception()  # taken: the caller asked for the end, not for its reason
+            raise
+
+    async def remove(self, name: str) -> bool:
+        """Remove a RApp; false when it was not there."""
+        return await asyncio.to_thread(self.folder.remove, name)
+
+    async def installed(self) -> dict[str, Manifest]:
+        """Return the manifests of the installed RApps by name."""
+        return await asyncio.to_thread(self.folder.list)
+
+    def _install(self, transport: "_LoopTransport", name: str, version: str | None, tell: Callable[..., None]) -> Installed:
+        url = f"{self._client.base_url}/tuf"
+        store = TrustedStore(transport, url, self._root, self._home / "trust", self._limits.package)
+        release = newest(store.releases(), name, version)
+        present = self.folder.find(name, release.version.text)
+        if present is not None and self.folder.find(name) == present:
+            return present
+        tell("downloading", version=release.version.text, bytes=0, of=release.length)
+        try:
+            aside = self._new_file()
+            source = PackageFile(aside, name, release.version.text, self._limits.package)
+            try:
+                store.download(release, aside, lambda count, _: tell("downloading", bytes=count, of=release.length))
+                tell("verified", version=release.version.text)
+                done = install(source, self.folder)
+            finally:
+                aside.unlink(missing_ok=True)
+        except OSError as error:
+            raise Refused(f"cannot install {name}: {error.strerror}, check the disk") from None
+        tell("installed", version=done.version, path=str(done.path))
+        return done
+
+    def _new_file(self) -> Path:
+        """Return the name of a file to download to; files that a power cut left behind go."""
+        folder = self._home / "downloads"
+        folder.mkdir(parents=True, exist_ok=True)
+        too_old = time.time() - 2 * self._limits.package_timeout
+        for path in folder.glob("*.hz"):
+            if path.stat().st_mtime < too_old:
+                path.unlink(missing_ok=True)
+        return folder / f"{secrets.token_hex(8)}.hz"
+
+
+class _LoopTransport:
+    """Bytes for a thread, fetched by the client of a loop."""
+
+    def __init__(self, client: HopClient, loop: asyncio.AbstractEventLoop, limits: DeliveryLimits) -> None:
+        self._client = client
+        self._loop = loop
+        self._limits = limits
+        self._lock = threading.Lock()
+        self._running: concurrent.futures.Future[int] | None = None
+        self._cancelled = False
+
+    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None) -> None:
+        """Fetch `url`; see `trust.Transport`."""
+        timeout = self._limits.metadata_timeout if "/metadata/" in url else self._limits.package_timeout
+        with self._lock:
+            if self._cancelled:
+                raise Unreachable(f"cannot fetch {url}: it was given up")
+            work = self._client.download(url, write, limit, timeout, on_progress)
+            self._running = asyncio.run_coroutine_threadsafe(work, self._loop)
+        try:
+            self._running.result(timeout + 5)
+        except concurrent.futures.CancelledError:
+            raise Unreachable(f"cannot fetch {url}: it was given up") from None
+        except TimeoutError:
+            self._running.cancel()
+            raise Unreachable(f"cannot fetch {url} within {timeout:g} s: try again later") from None
+
+    def cancel(self) -> None:
+        """End the fetch under way and refuse the next ones."""
+        with self._lock:
+            self._cancelled = True
+            if self._running is not None:
+                self._running.cancel()

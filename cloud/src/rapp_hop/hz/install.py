@@ -1,0 +1,214 @@
+"""Installed RApps on a disk: `install(source, destination)`, its undo `remove`, and the way back to the version before.
+
+Layout: `<root>/<name>/<version>/`, the links `current` and `previous` beside it. A version appears whole or not at all:
+unpacked aside, brought to the disk, renamed; then `current` is switched by renaming a link over it. Power loss leaves
+what was. The version before stays (DESIGN §3.4), older ones go.
+"""
+
+import errno
+import fcntl
+import secrets
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
+from rapp_hop.hz.archive import MANIFEST, extract, sync_folder
+from rapp_hop.hz.manifest import Manifest, parse_manifest
+from rapp_hop.hz.semver import parse_version
+from rapp_hop.hz.tar import Limits
+from rapp_hop.hz.text import check_name
+
+CURRENT, PREVIOUS = "current", "previous"
+_ASIDE = ".aside-"  # begin of every name that is not finished or not wanted any more
+_PATIENCE = 10.0  # seconds to wait for another installation on the same folder
+
+
+class Source(Protocol):
+    """A package about to be installed: who it must be, and how it comes onto a disk."""
+
+    @property
+    def name(self) -> str:
+        """Name that the manifest must have."""
+
+    @property
+    def version(self) -> str:
+        """Version that the manifest must have."""
+
+    def unpack(self, folder: Path) -> Manifest:
+        """Fill the new folder and return the manifest found; all of it is on the disk afterwards."""
+
+
+@dataclass(frozen=True)
+class PackageFile:
+    """The source for a verified .hz file."""
+
+    path: Path
+    name: str
+    version: str
+    limits: Limits
+
+    def unpack(self, folder: Path) -> Manifest:
+        """Fill the new folder from the file; see `archive.extract`."""
+        with self.path.open("rb") as file:
+            return extract(file, folder, self.limits).manifest
+
+
+@dataclass(frozen=True)
+class Installed:
+    """A version of a RApp on the disk."""
+
+    name: str
+    version: str
+    path: Path  # absolute
+    new: bool = False  # true when this call brought it
+
+
+class RappFolder:
+    """The destination: all installed RApps under one folder. Blocking; safe between threads and processes."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root.absolute()
+
+    def find(self, name: str, version: str | None = None) -> Installed | None:
+        """Return the installed version (the current one when none is named), or None."""
+        check_name(name)
+        if version is None:
+            version = self._linked(name, CURRENT)
+        if version is None or not (self.root / name / version / MANIFEST).is_file():
+            return None
+        return Installed(name, version, self.root / name / version)
+
+    def list(self) -> dict[str, Manifest]:
+        """Return the manifest of the current version of each installed RApp; a damaged one is left out."""
+        found: dict[str, Manifest] = {}
+        names = sorted(path.name for path in self.root.iterdir() if path.is_dir()) if self.root.is_dir() else []
+        for name in names:
+            try:
+                installed = self.find(name)
+                if installed is not None:
+                    found[name] = parse_manifest((installed.path / MANIFEST).read_bytes())
+            except (HopError, OSError):
+                continue
+        return found
+
+    def place(self, source: Source) -> Installed:
+        """Put the source's version beside the others and make it the current one.
+
+        :raises Invalid: when the package is not right or not the one that was asked for
+        :raises Refused: when the disk is full, read-only or otherwise unwilling
+        :raises Unreachable: when another installation holds the folder too long
+        """
+        name, version = check_name(source.name), parse_version(source.version).text
+        with self._locked():
+            there = self.find(name, version)
+            if there is None:
+                self._unpack(source, name, version)
+            self._switch(name, version)
+            self._prune(name)
+        return Installed(name, version, self.root / name / version, new=there is None)
+
+    def remove(self, name: str) -> bool:
+        """Take all versions of a RApp away; false when there was none."""
+        with self._locked():
+            if not (self.root / check_name(name)).is_dir():
+                return False
+            self._throw_away(self.root / name)
+            return True
+
+    def go_back(self, name: str) -> Installed:
+        """Make the version before the current one again and throw the failed one away.
+
+        :raises Refused: when there is no version before
+        """
+        with self._locked():
+            failed, before = self._linked(name, CURRENT), self._linked(name, PREVIOUS)
+            if before is None or failed is None or self.find(name, before) is None:
+                raise Refused(f"cannot go back with {name}: there is no version before, install it again")
+            _link(self.root / name, CURRENT, before)
+            (self.root / name / PREVIOUS).unlink()
+            self._throw_away(self.root / name / failed)
+        return Installed(name, before, self.root / name / before)
+
+    def _unpack(self, source: Source, name: str, version: str) -> None:
+        aside = self.root / f"{_ASIDE}{secrets.token_hex(8)}"
+        try:
+            manifest = source.unpack(aside)
+            if (manifest.name, manifest.version.text) != (name, version):
+                raise Invalid(f"cannot install {name} {version}: the package says it is {manifest.name} {manifest.version}")
+            aside.chmod(0o755)
+            (self.root / name).mkdir(exist_ok=True)
+            aside.rename(self.root / name / version)
+            sync_folder(self.root / name)
+            sync_folder(self.root)
+        except BaseException:
+            shutil.rmtree(aside, ignore_errors=True)
+            raise
+
+    def _switch(self, name: str, version: str) -> None:
+        folder, was = self.root / name, self._linked(name, CURRENT)
+        if was == version:
+            return
+        if was is not None:
+            _link(folder, PREVIOUS, was)
+        _link(folder, CURRENT, version)
+        sync_folder(folder)
+
+    def _prune(self, name: str) -> None:
+        kept = {self._linked(name, CURRENT), self._linked(name, PREVIOUS)}
+        for path in (self.root / name).iterdir():
+            if path.is_dir() and not path.is_symlink() and path.name not in kept:
+                self._throw_away(path)
+
+    def _throw_away(self, folder: Path) -> None:
+        aside = self.root / f"{_ASIDE}{secrets.token_hex(8)}"
+        folder.rename(aside)
+        sync_folder(folder.parent)
+        shutil.rmtree(aside, ignore_errors=True)
+
+    def _linked(self, name: str, link: str) -> str | None:
+        try:
+            return parse_version((self.root / name / link).readlink().name).text
+        except (OSError, Invalid):
+            return None
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Hold the folder alone, sweep up what an interrupted call left, and translate the disk's errors."""
+        try:
+            self.root.mkdir(parents=True, exist_ok=True)
+            with (self.root / ".lock").open("w") as lock:
+                _lock(lock.fileno())
+                for path in self.root.glob(f"{_ASIDE}*"):
+                    shutil.rmtree(path, ignore_errors=True)
+                yield
+        except OSError as error:
+            step = "free some space" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "check the folder"
+            raise Refused(f"cannot change {self.root}: {error.strerror}, {step}") from None
+
+
+def install(source: Source, destination: RappFolder) -> Installed:
+    """Install a package: unpack aside, check who it is, rename, switch. See `RappFolder.place` for the errors."""
+    return destination.place(source)
+
+
+def _lock(handle: int) -> None:
+    end = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            if time.monotonic() > end:
+                raise Unreachable("cannot install now: another installation runs, try again") from None
+            time.sleep(0.02)
+
+
+def _link(folder: Path, name: str, target: str) -> None:
+    aside = folder / f"{_ASIDE}{secrets.token_hex(8)}"
+    aside.symlink_to(target)
+    aside.replace(folder / name)
