@@ -1,7 +1,7 @@
 """Recognition of one spoken word or phrase out of a vocabulary, with a probability and so with rejection of other words.
 
-The probability is a logistic function of the likelihood ratio between the vocabulary's grammar and a free phone loop: a word that
-is not in the vocabulary is explained better by the loop. The weights were fitted on 20 words, 4 voices and 4 noise levels.
+The probability is a logistic function of the likelihood ratio between the vocabulary's grammar and a free phone loop: a word
+that is not in the vocabulary is explained better by the loop. The weights were fitted on 20 words, 4 voices and 4 noise levels.
 """
 
 import functools
@@ -15,6 +15,7 @@ from pocketsphinx import Decoder, get_model_path
 from rapp_nao_sim.sound.room import Block
 from rapp_nao_sim.sound.synthesis import RATE
 from rapp_nao_sim.speech.pronunciation import pronounce
+from rapp_nao_sim.speech.words import spoken_words
 
 WEIGHTS = (-0.154, 5.628, 7.037, -6.528)  # of likelihood ratio per frame, ratio, frames, and 1
 LANGUAGE_WEIGHT = 1.0  # pocketsphinx's default of 6.5 spoils the ratio
@@ -22,11 +23,6 @@ SCALE = 1024.0  # of pocketsphinx's scores, which are log likelihoods shifted by
 SHORTEST = 8  # frames of 10 ms; anything shorter counts as this long
 FILLERS = frozenset(("SIL", "<sil>", "[NOISE]", "[SPEECH]", "+NSN+", "+SPN+", "(NULL)", "NULL"))
 PAD = 0.2  # s of noise around the sound: the decoder's front end has to settle
-
-
-def spoken_words(phrase: str) -> list[str]:
-    """The words of a phrase as they are spoken, in lower case; hyphens within a word stay: "E-Mail" is "e-mail"."""
-    return re.findall(r"[^\W_]+(?:['\-][^\W_]+)*", phrase.lower())
 
 
 class Recogniser:
