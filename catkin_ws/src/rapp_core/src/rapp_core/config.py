@@ -1,0 +1,92 @@
+"""Settings of the core agent: one frozen object, from a file, then environment, then options."""
+
+import argparse
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import platformdirs
+
+from rapp_core.errors import Invalid
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one dynamic agent may use (DESIGN section 3.6)."""
+
+    memory: int = 1 << 30  # bytes of address space
+    cpu: int = 600  # s of processor time
+    processes: int = 64  # processes and threads
+    files: int = 256  # open files
+    file_size: int = 64 << 20  # bytes of one file
+
+
+@dataclass(frozen=True)
+class Config:
+    """Every setting and bound of the core agent."""
+
+    robot: str = "tcp://127.0.0.1:9559"  # NAOqi
+    home: Path = Path(platformdirs.user_data_dir("rapp"))  # $RAPP_HOME
+    name: str = "nao"  # of this robot, at the platform
+    kind: str = "nao"
+    language: str = "en"  # of the person
+    threshold: float = 0.4  # probability below which a word counts as unrecognised (paper section V.A.2)
+    recognise_timeout: float = 8.0  # s that rapp_recognize listens unless told otherwise
+    long_command: float = 1.0  # s; a longer sound that is no keyword is a long command
+    end_of_command: float = 0.8  # s of quiet that end a long command
+    verdict: float = 0.6  # s the recogniser may take after the end of a sound
+    listening_round: float = 20.0  # s after which a quiet listening round starts anew
+    naoqi_timeout: float = 5.0  # s for calls of NAOqi that return at once
+    register_timeout: float = 4.0  # s
+    register_again: float = 10.0  # s between tries while the platform is away
+    interpret_timeout: float = 30.0  # s
+    install_timeout: float = 60.0  # s
+    cloud_call_timeout: float = 30.0  # s for a dynamic agent's cloud call unless told otherwise
+    mail_timeout: float = 60.0  # s
+    first_word: float = 15.0  # s from activation to the dynamic agent's first word
+    heartbeat: float = 1.0  # s without a heartbeat after which the lease is silent
+    hang: float = 10.0  # s the dynamic agent's own loop may stand still outside of core services
+    dismantle: float = 5.0  # s for the dynamic agent to stop what it has started
+    terminate: float = 2.0  # s from SIGTERM to SIGKILL
+    limits: Limits = Limits()
+
+
+def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
+    """Build the configuration; raises Invalid for a file that cannot be used."""
+    parser = argparse.ArgumentParser(prog="core_agent", description="the robot's core agent")
+    parser.add_argument("--config", type=Path, help="TOML file of settings (see config/core_agent.toml)")
+    parser.add_argument("--robot", help="URL of NAOqi [RAPP_ROBOT]")
+    parser.add_argument("--home", type=Path, help="the robot's data folder [RAPP_HOME]")
+    parser.add_argument("--name", help="the robot's name at the platform [RAPP_ROBOT_NAME]")
+    options = parser.parse_args(words)
+    config = _with_file(Config(), options.config) if options.config else Config()
+    chosen: dict[str, Any] = {
+        "robot": options.robot or env.get("RAPP_ROBOT"),
+        "home": options.home or (Path(env["RAPP_HOME"]) if env.get("RAPP_HOME") else None),
+        "name": options.name or env.get("RAPP_ROBOT_NAME"),
+    }
+    config = replace(config, **{name: value for name, value in chosen.items() if value is not None})
+    return replace(config, home=config.home.expanduser().resolve())
+
+
+def _with_file(config: Config, path: Path) -> Config:
+    try:
+        values = tomllib.loads(path.read_text())
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise Invalid(f"cannot read the settings in {path}: {error}") from error
+    limits = replace(config.limits, **_checked(Limits, values.pop("limits", {}), path))
+    return replace(config, limits=limits, **_checked(Config, values, path))
+
+
+def _checked(cls: type[Any], values: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    known = {field.name: field.default for field in fields(cls)}
+    for name, value in values.items():
+        if name not in known:
+            raise Invalid(f"cannot use the settings in {path}: there is no {name}; known are {', '.join(known)}")
+        wanted = type(known[name])
+        if not isinstance(value, wanted | int if wanted is float else (str if wanted is not int else int)):
+            raise Invalid(f"cannot use the settings in {path}: {name} must be a {wanted.__name__}")
+    return {name: Path(value) if name == "home" else value for name, value in values.items()}

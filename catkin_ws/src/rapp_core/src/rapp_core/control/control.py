@@ -1,0 +1,247 @@
+"""What the states of the core FSM do."""
+
+import logging
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rapp_agent import Subsystem
+
+from rapp_core.config import Config
+from rapp_core.control.lease import Lease
+from rapp_core.control.listening import Listener
+from rapp_core.control.platform import Platform
+from rapp_core.errors import CoreError, Refused, Unreachable
+from rapp_core.launcher.launcher import Launcher
+from rapp_core.launcher.run import Run
+from rapp_core.ports import Hop, Robot
+from rapp_core.services.executor import Executor
+from rapp_core.trace import Happening, Trace
+
+_log = logging.getLogger(__name__)
+STEP = 0.05  # s between two looks at the dynamic agent
+RETRY = 1.0  # s between tries to reach the robot
+DYNAMIC_KINDS = ("entered", "left", "failed")
+
+READY = "I am ready"
+READY_ALONE = "I am ready, but I cannot reach the platform"
+NOT_UNDERSTOOD = "I did not understand you"
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What the control subsystem works with."""
+
+    robot: Robot
+    hop: Hop
+    launcher: Launcher
+    executor: Executor
+    platform: Platform
+    lease: Lease
+    trace: Trace
+    config: Config
+    stop: threading.Event
+
+
+class Control:
+    """Transition functions and terminal conditions of the core FSM (see `fsm.Acts`)."""
+
+    def __init__(self, parts: Parts) -> None:
+        self._parts = parts
+        self._listener = Listener(parts.robot, parts.config, time.monotonic)
+        self._recording = parts.config.home / "listening" / "command.ogg"
+        self._run: Run | None = None
+
+    # s1, s2: initialise, register
+
+    def initialise(self, share: Subsystem) -> None:
+        """Reach the robot, stop whatever moves, warm a spare."""
+        parts = self._parts
+        self._recording.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            parts.robot.body.stop()
+            parts.robot.player.stop()
+        except Refused as error:
+            _log.warning("%s", error)
+        except CoreError as error:
+            _log.warning("%s; trying again", error)
+            share.memory["ready"] = False
+            parts.stop.wait(RETRY)
+            return
+        parts.launcher.clear_orphans()
+        parts.launcher.prepare()
+        share.memory["ready"] = True
+
+    def initialised(self, share: Subsystem) -> bool:
+        """Whether the robot has answered."""
+        return bool(share.memory["ready"])
+
+    def register(self, _share: Subsystem) -> None:
+        """Register with the repository agent, and say that the robot is ready."""
+        registered = self._parts.platform.register()
+        self._say(READY if registered else READY_ALONE)
+
+    # s3 to s6: from a command to a package
+
+    def listen(self, share: Subsystem) -> None:
+        """One listening round."""
+        parts = self._parts
+        share.memory.update(keyword=None, command=None, problem=None, rapp=None, error=None)
+        keywords = {keyword: known.name for known in parts.platform.rapps().values() for keyword in known.keywords}
+        heard = self._listener.round(sorted(keywords), self._recording, parts.stop)
+        if isinstance(heard, Path):
+            share.memory["command"] = heard
+        elif heard is not None:
+            parts.trace.heard(heard)
+            share.memory.update(keyword=heard, rapp=keywords[heard])
+
+    def heard(self, share: Subsystem) -> bool:
+        """Whether a keyword or a long command was heard."""
+        return share.memory["keyword"] is not None or share.memory["command"] is not None
+
+    def keyword(self, share: Subsystem) -> None:
+        """The core agent itself knows which RApp an isolated keyword means."""
+        self._parts.trace.message(f"core: keyword {share.memory['keyword']} means {share.memory['rapp']}")
+
+    def long_command(self, share: Subsystem) -> None:
+        """The platform interprets a long command; the core agent has only recorded it."""
+        parts = self._parts
+        arguments = {"recording": str(share.memory["command"]), "language": parts.config.language}
+        parts.trace.message("core->repository interpret")
+        try:
+            answer = parts.hop.request("interpret", arguments, parts.config.interpret_timeout)
+        except CoreError as error:
+            self._problem(share, "I cannot reach the platform", error)
+            return
+        if answer.get("text"):
+            parts.trace.heard(str(answer["text"]))
+        share.memory["rapp"] = answer.get("rapp")
+        if answer.get("rapp") is None:
+            share.memory["problem"] = NOT_UNDERSTOOD
+
+    def download(self, share: Subsystem) -> None:
+        """Have the link download, verify and install the RApp; without the platform the installed one will do."""
+        parts, name = self._parts, str(share.memory["rapp"])
+        parts.trace.message(f"core->repository install {name}")
+        try:
+            answer = parts.hop.request("install", {"name": name}, parts.config.install_timeout, self._progress)
+            share.memory["package"] = Path(answer["path"])
+        except Unreachable as error:
+            known = parts.platform.rapps().get(name)
+            if known is None or known.path is None:
+                self._problem(share, "I cannot reach the platform", error)
+            else:
+                share.memory["package"] = known.path
+        except CoreError as error:
+            self._problem(share, f"I cannot install {name.replace('_', ' ')}", error)
+
+    def _progress(self, phase: str, _fraction: float) -> None:
+        self._parts.trace.message(f"repository->core {phase}")
+
+    # s7 to s9: the dynamic agent lives
+
+    def activate(self, share: Subsystem) -> None:
+        """Start the dynamic agent and give it the lease."""
+        parts = self._parts
+        try:
+            self._run = parts.launcher.activate(Path(str(share.memory["package"])), self._told)
+        except CoreError as error:
+            self._problem(share, "I cannot start it", error)
+            return
+        parts.lease.grant(self._run)
+        share.memory["until"] = time.monotonic() + parts.config.first_word
+
+    def await_first_word(self, share: Subsystem) -> None:
+        """Wait for the dynamic agent's first word over its channel."""
+        run = self._present()
+        run.first_word.wait(STEP)
+        if not run.first_word.is_set() and (not run.alive or time.monotonic() > float(str(share.memory["until"]))):
+            share.memory["problem"] = "It did not start"
+
+    def first_word_or_over(self, share: Subsystem) -> bool:
+        """Whether it has spoken, or never will."""
+        return self._present().first_word.is_set() or share.memory["problem"] is not None
+
+    def serve(self, share: Subsystem) -> None:
+        """Core services run in their callers' threads; here the lease is watched."""
+        run = self._present()
+        self._parts.stop.wait(STEP)
+        if run.outcome is None:
+            problem = self._parts.lease.problem(self._parts.executor.busy)
+            if problem is not None:
+                _log.warning("run %s: %s", run.name, problem)
+                share.memory["problem"] = problem
+
+    def over(self, share: Subsystem) -> bool:
+        """Whether the dynamic agent has finished, failed, died, or gone silent."""
+        outcome = self._present().outcome
+        if outcome is not None and outcome[0] != "done":
+            share.memory["problem"] = "It has failed"
+            _log.warning("the dynamic agent failed: %s", outcome[1])
+        return outcome is not None or share.memory["problem"] is not None or self._parts.stop.is_set()
+
+    # s10, s11: destroy, apologise
+
+    def destroy(self, _share: Subsystem) -> None:
+        """Stop the robot, dismantle in the order of DESIGN section 3.5, kill, release the lease, warm the next spare."""
+        run, parts = self._present(), self._parts
+        if run.outcome is None:
+            self._still()
+        if run.alive:
+            parts.trace.message("core->dynamic dismantle")
+            run.dismantle(parts.config.dismantle if run.outcome is not None else 0.2)
+        parts.lease.release()
+        self._still()
+        run.end(parts.config.terminate)
+        parts.trace.message("core: dynamic agent destroyed")
+        self._run = None
+        parts.launcher.prepare()
+
+    def _still(self) -> None:
+        for stop in (self._parts.robot.body.stop, self._parts.robot.player.stop, self._parts.robot.voice.hush):
+            try:
+                stop()
+            except CoreError as error:
+                _log.warning("%s", error)
+
+    def apologise(self, share: Subsystem) -> None:
+        """Say aloud what failed; a state that raised an error comes here too."""
+        error = share.memory.get("error")
+        if isinstance(error, Exception):
+            _log.error("state failed", exc_info=error)
+        self._say(str(share.memory.get("problem") or "Something went wrong"))
+
+    def close(self) -> None:
+        """End a run that still lives; the robot rests."""
+        if self._run is not None:
+            self._parts.lease.release()
+            self._run.end(self._parts.config.terminate)
+        try:
+            self._parts.robot.body.stop()
+            self._parts.robot.body.release()
+        except CoreError as error:
+            _log.warning("%s", error)
+
+    def _present(self) -> Run:
+        assert self._run is not None
+        return self._run
+
+    def _problem(self, share: Subsystem, words: str, error: CoreError) -> None:
+        _log.warning("%s: %s", words, error)
+        share.memory["problem"] = words
+
+    def _say(self, text: str) -> None:
+        try:
+            self._parts.executor.run("rapp_say", text=text, language="en")
+        except CoreError as error:
+            _log.warning("%s", error)
+
+    def _told(self, message: dict[str, Any]) -> None:
+        trace = self._parts.trace
+        if message["type"] == "state" and message.get("kind") in DYNAMIC_KINDS:
+            fields = [str(message.get(name, ""))[:200] for name in ("machine", "state", "kind", "detail")]
+            trace.tell(Happening("dynamic", fields[0], fields[1], fields[2], fields[3]))  # type: ignore[arg-type]
+        elif message["type"] != "state":
+            trace.message(f"dynamic->core {message['type']}")

@@ -1,0 +1,85 @@
+"""State s3: hears isolated keywords, and records what is said so that a long command is not lost (paper section III)."""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from rapp_core.config import Config
+from rapp_core.ports import Robot, Sound, Word
+
+STEP = 0.02  # s
+
+
+class Listener:
+    """One listening round after another: start, poll until something was said, stop."""
+
+    def __init__(self, robot: Robot, config: Config, now: Callable[[], float]) -> None:
+        self._robot = robot
+        self._config = config
+        self._now = now
+        self._heard: deque[tuple[float, Word | Sound]] = deque(maxlen=256)
+
+    def round(self, keywords: Sequence[str], recording: Path, stop: threading.Event) -> str | Path | None:
+        """Listen once: a keyword (as spelt in `keywords`), the recording of a long command, or None when all was quiet."""
+        self._heard.clear()
+        ears, recorder = self._robot.ears, self._robot.recorder
+        if keywords:
+            ears.set_vocabulary(keywords)
+        recorder.start(recording)
+        try:
+            ears.subscribe(lambda item: self._heard.append((self._now(), item)))
+            try:
+                return self._poll(recording, stop)
+            finally:
+                ears.unsubscribe()
+        finally:
+            recorder.stop()
+
+    def _poll(self, recording: Path, stop: threading.Event) -> str | Path | None:
+        until = self._now() + self._config.listening_round
+        speech = _Speech(self._config)
+        while not stop.wait(STEP):
+            while self._heard:
+                at, item = self._heard.popleft()
+                if isinstance(item, Word):
+                    if item.probability >= self._config.threshold:
+                        return item.text
+                else:
+                    speech.take(at, item)
+            if speech.is_command(self._now()):
+                return recording
+            if self._now() > until and speech.quiet(self._now()):
+                return None
+        return None
+
+
+class _Speech:
+    """Sounds of one round put together: pauses shorter than `end_of_command` belong to one utterance."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._begun: float | None = None
+        self._ended: float | None = None
+
+    def take(self, at: float, sound: Sound) -> None:
+        if sound.begun:
+            if self._begun is None or (self._ended is not None and at - self._ended > self._pause):
+                self._begun = at
+            self._ended = None
+        elif self._begun is not None:
+            self._ended = at
+
+    @property
+    def _pause(self) -> float:
+        return max(self._config.end_of_command, self._config.verdict)
+
+    def is_command(self, now: float) -> bool:
+        """Whether an utterance longer than a keyword has ended, and the recogniser has had its time."""
+        if self._begun is None or self._ended is None:
+            return False
+        return self._ended - self._begun >= self._config.long_command and now - self._ended >= self._pause
+
+    def quiet(self, now: float) -> bool:
+        """Whether nobody is speaking, nor has just spoken."""
+        return self._begun is None or (self._ended is not None and now - self._ended >= self._pause)

@@ -1,0 +1,35 @@
+"""What can go wrong on the robot, split by what the reader does next; `kind` is the word that crosses process borders."""
+
+
+class CoreError(Exception):
+    """Root of the core agent's errors."""
+
+    kind = "bug"
+
+
+class Refused(CoreError):  # noqa: N818 - the four names are the project's words for error kinds
+    """A rule forbids it: do not retry, tell the person."""
+
+    kind = "refused"
+
+
+class Unreachable(CoreError):  # noqa: N818
+    """The other side is not there or does not answer: try later."""
+
+    kind = "unreachable"
+
+
+class Invalid(CoreError):  # noqa: N818
+    """What was given is broken or hostile: correct it."""
+
+    kind = "invalid"
+
+
+class Bug(CoreError):  # noqa: N818
+    """The other side failed in a way of its own: report it."""
+
+    kind = "bug"
+
+
+KINDS: dict[str, type[CoreError]] = {error.kind: error for error in (Refused, Unreachable, Invalid, Bug)}
+"""Error class of each kind."""

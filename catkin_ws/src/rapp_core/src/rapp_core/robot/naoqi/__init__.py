@@ -1,0 +1,21 @@
+"""Virtual effectors and receptors on NAOqi, over the qi protocol (paper section II)."""
+
+from rapp_core.config import Config
+from rapp_core.ports import Robot
+from rapp_core.robot.naoqi.body import NaoqiBody
+from rapp_core.robot.naoqi.connection import Connection
+from rapp_core.robot.naoqi.ears import NaoqiEars
+from rapp_core.robot.naoqi.player import NaoqiPlayer
+from rapp_core.robot.naoqi.recorder import NaoqiRecorder
+from rapp_core.robot.naoqi.voice import NaoqiVoice
+
+
+def robot(connection: Connection, config: Config) -> Robot:
+    """All virtual effectors and receptors of one NAO."""
+    return Robot(
+        NaoqiVoice(connection),
+        NaoqiEars(connection, f"rapp_{config.name}"),
+        NaoqiRecorder(connection),
+        NaoqiPlayer(connection),
+        NaoqiBody(connection),
+    )

@@ -1,0 +1,118 @@
+"""The port Hop on ROS: services rapp_hop/*, answered by the link over rosbridge (deliverable Fig. 10)."""
+
+import json
+import queue
+import threading
+import time
+import uuid
+from collections.abc import Mapping
+from typing import Any
+
+import rospy
+from rapp_msgs.msg import HopEvent
+from rapp_msgs.srv import HopRequest
+from std_msgs.msg import String
+
+from rapp_core.errors import KINDS, Bug, Unreachable
+from rapp_core.ports import Progress
+
+SILENCE = 0.9  # s without a sign of life of the link after which it is gone
+ASKING = 3.0  # s for the link to accept a job
+STEP = 0.05  # s
+GONE = "cannot reach the link: it is not running, or rosbridge is away"
+
+
+class RosHop:
+    """Each request is a job: accepted at once, ended by an event, by its time-out, or by the loss of the link."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._jobs: dict[str, queue.Queue[Any]] = {}
+        self._alive = float("-inf")
+        self._cancel = rospy.Publisher("rapp_hop/cancel", String, queue_size=10)
+        self._subscribers = [
+            rospy.Subscriber("rapp_hop/events", HopEvent, self._take, queue_size=1000, tcp_nodelay=True),
+            rospy.Subscriber("rapp_hop/alive", String, self._sign_of_life, queue_size=10, tcp_nodelay=True),
+        ]
+
+    @property
+    def present(self) -> bool:
+        """See `ports.Hop`."""
+        return time.monotonic() - self._alive < SILENCE
+
+    def request(self, name: str, arguments: Mapping[str, Any], timeout: float, progress: Progress | None = None) -> Any:
+        """See `ports.Hop`."""
+        deadline = time.monotonic() + timeout
+        self._wait_present(min(deadline, time.monotonic() + 2 * SILENCE))
+        job = uuid.uuid4().hex
+        events: queue.Queue[Any] = queue.Queue(maxsize=1000)
+        with self._lock:
+            self._jobs[job] = events
+        try:
+            self._ask(name, job, json.dumps(arguments), timeout)
+            return self._wait(name, events, deadline, progress)
+        except Unreachable:
+            self._cancel.publish(job)
+            raise
+        finally:
+            with self._lock:
+                del self._jobs[job]
+
+    def _wait_present(self, until: float) -> None:
+        while not self.present:
+            if time.monotonic() > until:
+                raise Unreachable(GONE)
+            time.sleep(STEP)
+
+    def _ask(self, name: str, job: str, arguments: str, timeout: float) -> None:
+        """Call the link's service in a thread of its own: rospy knows no time-out of a call."""
+        answer: queue.Queue[Any] = queue.Queue(maxsize=1)
+
+        def call() -> None:
+            try:
+                answer.put(rospy.ServiceProxy(f"rapp_hop/{name}", HopRequest)(job=job, arguments=arguments, timeout=timeout))
+            except (rospy.ServiceException, rospy.ROSException, OSError) as error:
+                answer.put(error)
+
+        threading.Thread(target=call, name=f"hop {name}", daemon=True).start()
+        try:
+            outcome = answer.get(timeout=ASKING)
+        except queue.Empty:
+            raise Unreachable(f"{GONE} ({name} was not accepted in {ASKING:g} s)") from None
+        if isinstance(outcome, Exception):
+            raise Unreachable(f"{GONE} ({outcome})") from outcome
+        if not outcome.accepted:
+            raise KINDS["refused"](f"cannot {name}: {outcome.message}")
+
+    def _wait(self, name: str, events: "queue.Queue[Any]", deadline: float, progress: Progress | None) -> Any:
+        while True:
+            try:
+                event = events.get(timeout=STEP)
+            except queue.Empty:
+                if not self.present:
+                    raise Unreachable(f"cannot {name}: the link was lost") from None
+                if time.monotonic() > deadline:
+                    raise Unreachable(f"cannot {name}: no answer in time") from None
+                continue
+            if event.kind == HopEvent.PROGRESS:
+                if progress is not None:
+                    progress(event.phase, event.fraction)
+            elif event.kind == HopEvent.FAILED:
+                raise KINDS.get(event.error, Bug)(event.message)
+            else:
+                return json.loads(event.result)
+
+    def _take(self, event: Any) -> None:
+        with self._lock:
+            events = self._jobs.get(event.job)
+        if events is not None and not events.full():
+            events.put_nowait(event)
+
+    def _sign_of_life(self, _message: Any) -> None:
+        self._alive = time.monotonic()
+
+    def close(self) -> None:
+        """Leave the topics."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        self._cancel.unregister()

@@ -1,0 +1,72 @@
+"""The core services as ROS services: each call is checked against the lease, then executed as a sub-FSM of s9."""
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import rapp_msgs.srv
+import rospy
+
+from rapp_core.control.lease import Lease
+from rapp_core.errors import CoreError
+from rapp_core.launcher.run import Run
+from rapp_core.services.executor import Executor
+from rapp_core.services.outside import Outside
+from rapp_core.services.table import CORE_SERVICES, CoreService
+from rapp_core.trace import Trace
+
+_log = logging.getLogger(__name__)
+Handler = Callable[[Run, Any, Any], None]
+
+
+class RosServices:
+    """Advertises all services; `close` withdraws them."""
+
+    def __init__(self, executor: Executor, outside: Outside, lease: Lease, trace: Trace) -> None:
+        self._executor = executor
+        self._outside = outside
+        self._lease = lease
+        self._trace = trace
+        self._services = [self._offer(row.name, row.srv, self._core(row)) for row in CORE_SERVICES]
+        self._services.append(self._offer("rapp_cloud_call", "CloudCall", self._cloud_call))
+        self._services.append(self._offer("rapp_send_mail", "SendMail", self._send_mail))
+
+    def _offer(self, name: str, srv: str, handler: Handler) -> Any:
+        cls = getattr(rapp_msgs.srv, srv)
+
+        def serve(request: Any) -> Any:
+            response = cls._response_class()
+            try:
+                run = self._lease.check(request._connection_header.get("rapp_channel"))
+                self._trace.message(f"dynamic->core {name}")
+                with self._executor.counted():
+                    handler(run, request, response)
+                response.success = True
+            except CoreError as error:
+                _log.warning("%s: %s", name, error)
+                response.message = str(error)
+                if hasattr(response, "error"):
+                    response.error = error.kind
+            self._trace.message(f"core->dynamic reply {name}")
+            return response
+
+        return rospy.Service(name, cls, serve)
+
+    def _core(self, row: CoreService) -> Handler:
+        def execute(_run: Run, request: Any, response: Any) -> None:
+            fields = {name: getattr(request, name) for name in request.__slots__ if not name.startswith("_")}
+            for name, value in self._executor.run(row.name, **fields).items():
+                setattr(response, name, value)
+
+        return execute
+
+    def _cloud_call(self, run: Run, request: Any, response: Any) -> None:
+        response.result = self._outside.cloud_call(run, request.service, request.arguments, request.timeout)
+
+    def _send_mail(self, run: Run, request: Any, response: Any) -> None:
+        response.state = self._outside.send_mail(run, request.recipients, request.subject, request.body, request.attachment)
+
+    def close(self) -> None:
+        """Withdraw all services."""
+        for service in self._services:
+            service.shutdown("the core agent ends")

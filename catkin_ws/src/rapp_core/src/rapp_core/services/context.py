@@ -1,0 +1,72 @@
+"""What a service's sub-FSM works with: robot, clock, settings, trace, and a way to be cut short."""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rapp_agent import Buffer, Machine, Subsystem
+
+from rapp_core.config import Config
+from rapp_core.errors import CoreError, Refused
+from rapp_core.ports import Robot
+from rapp_core.trace import Trace
+
+STEP = 0.02  # s between steps of a service that waits
+
+
+@dataclass(frozen=True)
+class Context:
+    """Shared by all services; `cut` ends whatever runs when set."""
+
+    robot: Robot
+    config: Config
+    trace: Trace
+    cut: threading.Event = field(default_factory=threading.Event)
+    now: Callable[[], float] = time.monotonic
+    recordings: Callable[[], Path] = Path  # folder of the present run's recordings
+
+
+class Reply(dict[str, Any]):
+    """Fields of a service's response."""
+
+
+def subsystem(name: str, **request: Any) -> Subsystem:
+    """The control subsystem's share of one service call: an input buffer for what is heard, the request in memory."""
+    return Subsystem(name, inputs=[Buffer("heard", 256)], memory={"request": request, "reply": Reply()})
+
+
+def execute(machine: Machine, share: Subsystem, context: Context) -> Reply:
+    """Step a service's sub-FSM to its end; gives the reply. Raises CoreError, Refused when it is cut short."""
+    stop = machine.listen(context.trace.service_event)
+    try:
+        while not machine.step(share):
+            if context.cut.wait(STEP):
+                raise Refused("cannot finish: the dynamic agent's lease has ended")
+    finally:
+        stop()
+        undo = share.memory.get("undo")
+        if callable(undo):
+            undo()
+    error = share.memory.get("error")
+    if isinstance(error, CoreError):
+        raise error
+    reply = share.memory["reply"]
+    assert isinstance(reply, Reply)
+    return reply
+
+
+def request(share: Subsystem, name: str) -> Any:
+    """A field of the request."""
+    fields = share.memory["request"]
+    assert isinstance(fields, dict)
+    return fields[name]
+
+
+def reply(share: Subsystem, **fields: Any) -> None:
+    """Set fields of the reply."""
+    answer = share.memory["reply"]
+    assert isinstance(answer, Reply)
+    answer.update(fields)

@@ -1,0 +1,59 @@
+"""One hook for all that happens: states, what was said and heard, messages between agents; log, tests, screens listen."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from rapp_agent import Event
+
+Kind = Literal["entered", "left", "failed", "said", "heard", "message"]
+
+
+@dataclass(frozen=True)
+class Happening:
+    """One thing that happened; `detail` holds the words or the message."""
+
+    agent: str
+    machine: str
+    state: str
+    kind: Kind
+    detail: str
+
+
+class Trace:
+    """Tells listeners what happens; `state` is where the core FSM is."""
+
+    def __init__(self) -> None:
+        self._listeners: list[Callable[[Happening], None]] = []
+        self.state = ""
+
+    def listen(self, listener: Callable[[Happening], None]) -> None:
+        """Tell `listener` everything from now on; called from any thread, must return at once."""
+        self._listeners.append(listener)
+
+    def core_event(self, event: Event) -> None:
+        """An event of the core FSM or of one of its sub-FSMs."""
+        if event.kind == "entered" and len(event.path) == 1:
+            self.state = event.state
+        self.tell(Happening("core", event.machine, event.state, event.kind, event.detail))
+
+    def service_event(self, event: Event) -> None:
+        """An event of a core service, a sub-FSM of s9 (or of s3, when the core itself uses it)."""
+        self.tell(Happening("core", event.machine, f"{self.state}/{event.state}", event.kind, event.detail))
+
+    def said(self, text: str) -> None:
+        """The robot says a text."""
+        self.tell(Happening("core", "core", self.state, "said", text))
+
+    def heard(self, text: str) -> None:
+        """The robot has recognised a text."""
+        self.tell(Happening("core", "core", self.state, "heard", text))
+
+    def message(self, text: str) -> None:
+        """A message between agents or to a virtual effector or receptor, as in Figs 5 to 12 of the paper."""
+        self.tell(Happening("core", "core", self.state, "message", text))
+
+    def tell(self, happening: Happening) -> None:
+        """Tell all listeners."""
+        for listener in self._listeners:
+            listener(happening)
