@@ -1,0 +1,61 @@
+"""The core agent as a RApp sees it (port), and which one this process talks to."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from rapp_api.errors import Bug
+
+
+class CoreAgent(Protocol):
+    """The core agent's services (deliverable section 4.5). All calls suspend the caller until the reply (paper Figs 9 to 12)."""
+
+    def say(self, text: str, language: str) -> None:
+        """Say a text; language is a code such as "en"."""
+
+    def recognize(self, dictionary: Sequence[str], timeout: float) -> str:
+        """Recognise one word of the dictionary; "Empty" when none was. `timeout` in s, 0 for the core agent's own."""
+
+    def record(self, duration: float) -> str:
+        """Record for `duration` s; gives the path of the Ogg file."""
+
+    def record_until_silence(self, path: str, waiting_time: float, microphone_energy: int) -> str:
+        """Record until it was quieter than `microphone_energy` for `waiting_time` s; gives the path of the Ogg file."""
+
+    def play_audio(self, path: str, position: float, volume: float, balance: float, loop: bool) -> None:
+        """Play a file."""
+
+    def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float) -> Any:
+        """Call a HOP service of the repository agent; gives its JSON result."""
+
+    def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
+        """Send a mail; gives "delivered" or "kept"."""
+
+
+class Activity:
+    """Counts what the dynamic agent's own loop does; the heartbeat carries the count, so that a standstill is seen."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def moved(self) -> None:
+        """Count one step."""
+        self.count += 1
+
+
+activity = Activity()
+"""The count of this process."""
+
+_current: list[CoreAgent] = []
+
+
+def use(core: CoreAgent) -> Callable[[], None]:
+    """Let this process talk to `core`; gives the function that ends that."""
+    _current.append(core)
+    return lambda: _current.remove(core)
+
+
+def current() -> CoreAgent:
+    """The core agent of this process; raises Bug outside a RApp's run."""
+    if not _current:
+        raise Bug("cannot reach a core agent: this program was not started by one; use rapp_api.testing to try it by itself")
+    return _current[-1]
