@@ -7,7 +7,7 @@ from rapp_api.errors import Bug
 
 
 class CoreAgent(Protocol):
-    """The core agent's services (deliverable section 4.5). All calls suspend the caller until the reply (paper Figs 9 to 12)."""
+    """The core agent's services (deliverable section 4.5). Calls suspend the caller until the reply (paper Figs 9 to 12)."""
 
     def say(self, text: str, language: str) -> None:
         """Say a text; language is a code such as "en"."""

@@ -41,7 +41,7 @@ class DynamicAgent:
             error = share.memory.get("error")
             send_terminate(error if isinstance(error, Exception) else None)
 
-        states = {
+        states: dict[str, Behaviour | Machine] = {
             "s1": _doing("s1", open_channel, "open channel"),
             "s2": _doing("s2", self.initialise, "initialise"),
             "s3": task,

@@ -74,7 +74,7 @@ def _be(channel: Channel, order: dict[str, Any]) -> DynamicAgent | None:
     try:
         agent = load(Path(order["package"]) / order["entry"])(order["parameters"])
         agent.run(lambda: channel.send(type="first_word", name=type(agent).__name__), _terminate(channel), _event(channel))
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - reported to the core agent, whatever it is
         _log.exception("the RApp failed")
         channel.send(type="terminate", outcome="failed", detail=f"{type(error).__name__}: {error}")
         return None
