@@ -2,12 +2,15 @@
 
 from typing import Any
 
-from rapp_agent import Behaviour, Edge, Machine, Subsystem
-from rapp_api import DynamicAgent, RappError, cloud
+from rapp_api import Behaviour, DynamicAgent, Edge, Machine, RappError, Subsystem, cloud
 from rapp_api.communication import EMPTY, rapp_recognize, rapp_record, rapp_say
 
 TRIES = 3  # how often the recipient's name is asked for
 MESSAGE_SECONDS = 8.0  # s, unless package.json says otherwise
+
+
+def _saying(name: str, text: str) -> Behaviour:
+    return Behaviour(name, lambda _share: rapp_say(text), label=f"say: {text}")
 
 
 class VoiceMail(DynamicAgent):
@@ -31,13 +34,11 @@ class VoiceMail(DynamicAgent):
     def task(self) -> Machine:
         """s31 to s36; a recipient who is not understood is asked for again, three times in all."""
         states = {
-            "s31": Behaviour(
-                "s31", lambda _share: rapp_say("starting word recognition"), label="say: starting word recognition"
-            ),
+            "s31": _saying("s31", "starting word recognition"),
             "s32": Behaviour("s32", self._recipient, label="get e-mail address based on the recognised word"),
-            "s33": Behaviour("s33", lambda _share: rapp_say("recording message"), label="say: recording message"),
+            "s33": _saying("s33", "recording message"),
             "s34": Behaviour("s34", self._record, label="record message content"),
-            "s35": Behaviour("s35", lambda _share: rapp_say("sending e-mail"), label="say: sending e-mail"),
+            "s35": _saying("s35", "sending e-mail"),
             "s36": Behaviour("s36", self._send, label="send the e-mail"),
             "again": Behaviour("again", self._again, label="say: again, or give up"),
             "end": Behaviour("end", self._end, label="say how it ended"),
