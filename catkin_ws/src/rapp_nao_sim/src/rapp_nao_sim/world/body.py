@@ -1,0 +1,122 @@
+"""The NAO in a pybullet world: its joints, motors and pose."""
+
+import math
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rapp_nao_sim.world.model import BODY, JOINTS, SHAPES, SOLE
+from rapp_nao_sim.world.urdf import urdf, write_meshes
+
+Quaternion = tuple[float, float, float, float]
+
+_GAIN = 0.3  # of pybullet's position motors; .1 to .6 stand alike
+_GEARS = 0.15  # share of its torque that the friction of a joint's gears holds without stiffness
+_CLEARANCE = 0.0005  # m above the floor when the body is put down
+
+
+class Body:
+    """The robot; joints are named as NAOqi does, angles are in rad, the world's frame in m."""
+
+    def __init__(self, bullet: Any, looks: bool) -> None:
+        self._bullet = bullet
+        with tempfile.TemporaryDirectory(prefix="rapp-nao-") as folder:
+            path = Path(folder) / "nao.urdf"
+            path.write_text(urdf(write_meshes(Path(folder)) if looks else None))
+            self._robot: int = bullet.loadURDF(str(path), (0, 0, 1))
+        infos = [bullet.getJointInfo(self._robot, number) for number in range(bullet.getNumJoints(self._robot))]
+        self._number = {info[1].decode(): int(info[0]) for info in infos}
+        self._numbers = [self._number[name] for name in BODY]
+        links = {info[12].decode(): int(info[0]) for info in infos}
+        self._solid = [links.get(name, -1) for name in SHAPES]
+        self._feet = [links["LAnkle"], links["RAnkle"]]
+        for foot in self._feet:
+            bullet.changeDynamics(self._robot, foot, lateralFriction=0.9)
+
+    def angles(self) -> dict[str, float]:
+        """What the joints' sensors read."""
+        states = self._bullet.getJointStates(self._robot, self._numbers)
+        return {name: float(state[0]) for name, state in zip(BODY, states, strict=True)}
+
+    def drive(self, targets: Mapping[str, float], stiffness: Mapping[str, float]) -> None:
+        """Let the motors hold these angles with these stiffnesses (0 to 1) until told otherwise."""
+        bullet = self._bullet
+        for name, number in self._number.items():
+            bullet.setJointMotorControl2(
+                self._robot,
+                number,
+                bullet.POSITION_CONTROL,
+                targetPosition=targets[name],
+                force=JOINTS[name].torque * max(_GEARS, stiffness[name]),
+                positionGain=_GAIN,
+                velocityGain=1.0,
+            )
+
+    def put(self, angles: Mapping[str, float], orientation: Quaternion, feet: tuple[float, float]) -> None:
+        """Set the whole body at rest in a shape, with the middle of its soles above `feet` and its lowest part on the floor."""
+        bullet = self._bullet
+        for name, number in self._number.items():
+            bullet.resetJointState(self._robot, number, angles[name])
+        bullet.resetBasePositionAndOrientation(self._robot, (0, 0, 1), orientation)
+        x, y = self.feet()
+        lowest = min(bullet.getAABB(self._robot, link)[0][2] for link in self._solid)
+        position = (feet[0] - x, feet[1] - y, 1 - lowest + _CLEARANCE)
+        bullet.resetBasePositionAndOrientation(self._robot, position, orientation)
+        bullet.resetBaseVelocity(self._robot, (0, 0, 0), (0, 0, 0))
+
+    def mirror(self, angles: Mapping[str, float], position: tuple[float, float, float], orientation: Quaternion) -> None:
+        """Take the state that `angles` and `base` of another Body gave."""
+        for name, number in self._number.items():
+            self._bullet.resetJointState(self._robot, number, angles[name])
+        self._bullet.resetBasePositionAndOrientation(self._robot, position, orientation)
+
+    def base(self) -> tuple[tuple[float, float, float], Quaternion]:
+        """Position of the torso's centre of mass and orientation of the torso."""
+        position, orientation = self._bullet.getBasePositionAndOrientation(self._robot)
+        return position, orientation
+
+    def velocity(self) -> tuple[float, float, float]:
+        """vx, vy (m/s) and turning (rad/s) of the torso in the world."""
+        (x, y, _), (_, _, turn) = self._bullet.getBaseVelocity(self._robot)
+        return (float(x), float(y), float(turn))
+
+    def feet(self) -> tuple[float, float]:
+        """Middle of the soles."""
+        soles = []
+        for foot in self._feet:
+            state = self._bullet.getLinkState(self._robot, foot, computeForwardKinematics=1)
+            soles.append(self._bullet.multiplyTransforms(state[4], state[5], SOLE, (0, 0, 0, 1))[0])
+        left, right = soles
+        return ((left[0] + right[0]) / 2, (left[1] + right[1]) / 2)
+
+    def pose(self) -> tuple[float, float, float]:
+        """x and y of the middle of the soles, and the heading, which is meant also for a lying robot."""
+        return (*self.feet(), self.heading())
+
+    def heading(self) -> float:
+        """Direction on the floor in which the robot, were it turned upright about its own left-right axis, would look."""
+        forward, _, up = self._axes()
+        x, y = (up[2] * forward[i] - forward[2] * up[i] for i in (0, 1))
+        if math.hypot(x, y) < 0.1:  # on its side
+            x, y = forward[0], forward[1]
+        return math.atan2(y, x)
+
+    def lean(self) -> tuple[float, float]:
+        """Pitch (forward positive) and roll (to the right positive) of the torso."""
+        forward, left, up = self._axes()
+        return math.atan2(-forward[2], up[2]) if abs(left[2]) < 0.9 else 0.0, math.asin(max(-1.0, min(1.0, left[2])))
+
+    def hips(self) -> float:
+        """Height of the hips above the floor, m."""
+        state = self._bullet.getLinkState(self._robot, self._number["LHipYawPitch"], computeForwardKinematics=1)
+        return float(state[4][2])
+
+    def push(self, force: tuple[float, float, float]) -> None:
+        """A force in N on the torso, for the next step."""
+        position, _ = self.base()
+        self._bullet.applyExternalForce(self._robot, -1, force, position, self._bullet.WORLD_FRAME)
+
+    def _axes(self) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+        matrix = self._bullet.getMatrixFromQuaternion(self.base()[1])
+        return (matrix[0::3], matrix[1::3], matrix[2::3])

@@ -1,0 +1,235 @@
+"""Moves the body: joints on tracks by their motors, changes of posture kinematically, stiffness.
+
+A change of posture sets joints and torso along a way that always rests on the floor and hands over to the physics at its end;
+meanwhile joints that are commanded one by one follow their own tracks.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rapp_nao_sim.world.body import Body, Quaternion
+from rapp_nao_sim.world.errors import Refused
+from rapp_nao_sim.world.model import BODY, CHAINS, JOINTS, TWINS
+from rapp_nao_sim.world.moves import Track, clip, direct, ease, posture_time, through
+from rapp_nao_sim.world.postures import LEAN_TOLERANCE, Posture, family, recognise
+
+_SETTLE = 0.3  # s of physics after a change, before it is judged
+_SLIP = 0.01  # rad that a limp joint gives before its gears slip
+_Answer = Callable[[int, bool], None]
+
+
+@dataclass(frozen=True)
+class _Change:
+    """A change of posture under way."""
+
+    number: int  # of the request that waits for it
+    posture: Posture
+    begin: float
+    end: float
+    angles: Mapping[str, float]  # at the beginning
+    orientations: tuple[Quaternion, Quaternion]
+    feet: tuple[float, float]
+    release: bool  # remove the stiffness at the end
+
+
+class Motion:
+    """Commands to the body; `answer(number, reached)` is called when a command that takes time ends."""
+
+    def __init__(self, bullet: Any, body: Body, postures: Mapping[str, Posture], answer: _Answer) -> None:
+        self._bullet = bullet
+        self._body = body
+        self._postures = postures
+        self._answer = answer
+        self._now = 0.0
+        self._tracks: dict[str, Track] = {}
+        self._jobs: dict[int, set[str]] = {}
+        self._change: _Change | None = None
+        self._moved = True
+        self.targets = body.angles()
+        self.stiffness = dict.fromkeys(BODY, 1.0)
+
+    def begin(self, name: str, feet: tuple[float, float], theta: float) -> None:
+        """Put the robot in a posture at a place, at once."""
+        posture = self._posture(name)
+        self._body.put(posture.angles, self._upright(theta, posture.pitch), feet)
+        self.targets = dict(posture.angles)
+        self._moved = True
+
+    def tick(self, seconds: float) -> bool:
+        """Let time pass; gives whether the physics shall step (not while the posture changes)."""
+        self._now += seconds
+        self._follow()
+        if self._change is not None and self._now < self._change.end:
+            self._transform(self._change)
+            return False
+        if self._change is not None and self._now >= self._change.end + _SETTLE:
+            self._finish(self._change)
+        self._slip()
+        if self._moved:
+            self._body.drive(self.targets, self.stiffness)
+            self._moved = False
+        return True
+
+    def set_joints(self, names: Sequence[str], angles: Sequence[float], fraction: float) -> None:
+        """Send joints to angles at a fraction (0 to 1) of their greatest speed."""
+        if not 0 < fraction <= 1:
+            raise Refused(f"cannot move at {fraction:g} of the greatest speed; give more than 0 and at most 1")
+        for name, angle in zip(names, angles, strict=True):
+            self._joint(name)
+            for joint in (name, *_twin(name)):
+                self._replace(joint, direct(joint, self._now, self.targets[joint], clip(joint, angle), fraction))
+
+    def move_joints(self, number: int, names: Sequence[str], goals: Sequence[Sequence[float]], times: Sequence[Sequence[float]]) -> None:
+        """Send joints through angles at times (s from now, rising); answers at the end, false when something stopped them."""
+        for name, way, when in zip(names, goals, times, strict=True):
+            self._joint(name)
+            if not way or len(way) != len(when) or any(b <= a for a, b in zip((0.0, *when), when, strict=False)):
+                raise Refused(f"cannot move {name}: it needs as many rising times above 0 as angles")
+        joints: set[str] = set()
+        for name, way, when in zip(names, goals, times, strict=True):
+            for joint in (name, *_twin(name)):
+                self._replace(joint, through(self._now, self.targets[joint], [clip(joint, angle) for angle in way], when))
+                joints.add(joint)
+        self._jobs[number] = joints
+
+    def set_posture(self, number: int, name: str, speed: float, release: bool = False) -> None:
+        """Take a posture; answers at the end whether it is reached."""
+        posture = self._posture(name)
+        if not 0 < speed <= 1:
+            raise Refused(f"cannot take a posture at speed {speed:g}; give more than 0 and at most 1")
+        if not self.awake():
+            raise Refused("cannot take a posture: the legs have no stiffness; wake the robot up first")
+        self.stop()
+        pitch, roll = self._body.lean()
+        start, (_, orientation) = self._body.angles(), self._body.base()
+        time = posture_time(start, dict(posture.angles), abs(pitch - posture.pitch) + abs(roll), speed)
+        x, y, theta = self._body.pose()
+        way = (orientation, self._upright(theta, posture.pitch))
+        self._change = _Change(number, posture, self._now, self._now + time, start, way, (x, y), release)
+
+    def wake_up(self, number: int) -> None:
+        """Stiffen all joints; a robot that is on its feet stands up."""
+        asleep = not self.awake()
+        self.set_stiffness(BODY, [1.0] * len(BODY))
+        if asleep and self.posture()[1] == "Standing":
+            self.set_posture(number, "StandInit", 0.5)
+        else:
+            self._answer(number, True)
+
+    def rest(self, number: int) -> None:
+        """Go to a resting posture (crouched, or as it sits or lies) and remove the stiffness."""
+        if self.awake() and self.posture()[1] == "Standing":
+            self.set_posture(number, "Crouch", 0.5, release=True)
+        else:
+            self.stop()
+            self.set_stiffness(BODY, [0.0] * len(BODY))
+            self._answer(number, True)
+
+    def set_stiffness(self, names: Sequence[str], values: Sequence[float]) -> None:
+        """Share of the motors' torque, 0 to 1."""
+        actual = self._body.angles()
+        for name, value in zip(names, values, strict=True):
+            self._joint(name)
+            for joint in (name, *_twin(name)):
+                if self.stiffness[joint] == 0:  # it may have sunk: it stiffens where it is
+                    self.targets[joint] = actual[joint]
+                self.stiffness[joint] = min(1.0, max(0.0, float(value)))
+        self._moved = True
+
+    def stop(self) -> None:
+        """End all movement here; who waits for it hears false."""
+        self._tracks.clear()
+        for number in self._jobs:
+            self._answer(number, False)
+        self._jobs.clear()
+        change, self._change = self._change, None
+        if change is not None:
+            self._moved = True
+            self._answer(change.number, False)
+
+    def moving(self) -> bool:
+        """Whether a command is under way."""
+        return bool(self._tracks) or self._change is not None
+
+    def awake(self) -> bool:
+        """Whether the legs have stiffness."""
+        return all(self.stiffness[name] > 0 for name in CHAINS["Legs"])
+
+    def posture(self) -> tuple[str, str]:
+        """Name and family of what the body is in; the name is "Unknown" in between."""
+        pitch, roll = self._body.lean()
+        name = recognise(self._postures, self._body.angles(), pitch, roll)
+        if name != "Unknown":
+            return name, self._postures[name].family
+        return name, family(pitch, roll, self._body.hips())
+
+    def _follow(self) -> None:
+        for joint, track in list(self._tracks.items()):
+            if self.stiffness[joint] > 0:
+                self.targets[joint] = track.at(self._now)
+                self._moved = True
+            if self._now >= track.end:
+                del self._tracks[joint]
+                self._arrived(joint)
+
+    def _slip(self) -> None:
+        """Let limp joints give way: dry friction holds them where they are until the load drags them on."""
+        limp = [name for name in BODY if self.stiffness[name] == 0]
+        if not limp:
+            return
+        actual = self._body.angles()
+        for name in limp:
+            held = min(actual[name] + _SLIP, max(actual[name] - _SLIP, self.targets[name]))
+            if held != self.targets[name]:
+                self.targets[name] = held
+                self._moved = True
+
+    def _arrived(self, joint: str) -> None:
+        for number, joints in list(self._jobs.items()):
+            joints.discard(joint)
+            if not joints:
+                del self._jobs[number]
+                self._answer(number, True)
+
+    def _replace(self, joint: str, track: Track) -> None:
+        for number, joints in list(self._jobs.items()):
+            if joint in joints:
+                del self._jobs[number]
+                self._answer(number, False)
+        self._tracks[joint] = track
+
+    def _transform(self, change: _Change) -> None:
+        share = ease((self._now - change.begin) / (change.end - change.begin))
+        for name in BODY:
+            if name not in self._tracks:
+                self.targets[name] = change.angles[name] + (change.posture.angles[name] - change.angles[name]) * share
+        orientation = self._bullet.getQuaternionSlerp(*change.orientations, share)
+        self._body.put(self.targets, orientation, change.feet)
+        self._moved = True
+
+    def _finish(self, change: _Change) -> None:
+        self._change = None
+        pitch, roll = self._body.lean()
+        if change.release:
+            self.set_stiffness(BODY, [0.0] * len(BODY))
+        self._answer(change.number, max(abs(pitch - change.posture.pitch), abs(roll)) < LEAN_TOLERANCE)
+
+    def _posture(self, name: str) -> Posture:
+        if name not in self._postures:
+            raise Refused(f"cannot take posture {name!r}: known are {', '.join(self._postures)}")
+        return self._postures[name]
+
+    def _joint(self, name: str) -> None:
+        if name not in JOINTS:
+            raise Refused(f"cannot find joint {name!r}: known are {', '.join(BODY)}")
+
+    def _upright(self, theta: float, pitch: float) -> Quaternion:
+        bullet = self._bullet
+        turn, lean = bullet.getQuaternionFromEuler((0, 0, theta)), bullet.getQuaternionFromEuler((0, pitch, 0))
+        orientation: Quaternion = bullet.multiplyTransforms((0, 0, 0), turn, (0, 0, 0), lean)[1]
+        return orientation
+
+
+def _twin(name: str) -> tuple[str, ...]:
+    return (TWINS[name],) if name in TWINS else ()

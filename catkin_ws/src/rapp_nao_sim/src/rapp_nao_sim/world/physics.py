@@ -1,0 +1,160 @@
+"""The physics process: the room and the robot, stepped in real time, commanded over its line.
+
+Started by WorldClient as `python -m rapp_nao_sim.world.physics FD`.
+"""
+
+import logging
+import math
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from rapp_nao_sim.world import postures, room
+from rapp_nao_sim.world.body import Body
+from rapp_nao_sim.world.bullet import connect
+from rapp_nao_sim.world.errors import Invalid, Refused
+from rapp_nao_sim.world.motion import Motion
+from rapp_nao_sim.world.scene import Scene
+from rapp_nao_sim.world.worker import WAIT, Service, serve
+
+STEP = 1 / 240  # s of one step of the physics
+STEPS = 3  # per tick
+TICK = STEP * STEPS
+LATEST = 0.25  # s behind the clock, after which lost time is given up
+FALLEN = 0.8  # rad the torso leans more than in any posture on feet or seat
+LIMIT = 60.0  # s, of a push; N/s bounds are the caller's business
+
+_log = logging.getLogger(__name__)
+
+
+class Physics:
+    """The simulated world."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._bullet = connect()
+        self._pushes: list[tuple[tuple[float, float, float], float]] = []
+        service.offer({"set_up": self._set_up})
+
+    def _set_up(self, file: Path | None, posture: str | None) -> room.Room:
+        plan = room.load(file or room.FILE)
+        known = postures.load()
+        start = plan.robot
+        bullet = self._bullet
+        bullet.setGravity(0, 0, -9.81)
+        bullet.setTimeStep(STEP)
+        name = posture or start.posture
+        if name not in known:
+            raise Invalid(f"cannot start in posture {name!r}: known are {', '.join(known)}; correct [robot] of the room file")
+        self._scene = Scene(bullet, plan, pictures=False)
+        self._body = Body(bullet, looks=False)
+        self._motion = Motion(bullet, self._body, known, self._service.answer)
+        self._motion.begin(name, (start.x, start.y), start.theta)
+        self._door, self._lamp = plan.door.angle, plan.light.lamp
+        self._service.offer(self._commands())
+        return plan
+
+    def _commands(self) -> dict[str, Callable[..., Any]]:
+        body, motion = self._body, self._motion
+
+        def later(command: Callable[..., None]) -> Callable[..., Any]:
+            def begin(*args: Any) -> Any:
+                command(self._service.number, *args)
+                return WAIT
+
+            return begin
+
+        return {
+            "robot_pose": body.pose,
+            "velocity": body.velocity,
+            "joint_angles": lambda names: _pick(body.angles(), names),
+            "commanded_angles": lambda names: _pick(motion.targets, names),
+            "stiffnesses": lambda names: _pick(motion.stiffness, names),
+            "set_stiffness": motion.set_stiffness,
+            "set_joints": motion.set_joints,
+            "move_joints": later(motion.move_joints),
+            "set_posture": later(motion.set_posture),
+            "posture": motion.posture,
+            "wake_up": later(motion.wake_up),
+            "rest": later(motion.rest),
+            "stop": motion.stop,
+            "is_moving": motion.moving,
+            "awake": motion.awake,
+            "fallen": self._fallen,
+            "push": self._push,
+            "set_door": self._set_door,
+            "set_lamp": self._set_lamp,
+            "snapshot": self._snapshot,
+        }
+
+    def run(self) -> None:
+        """Wait to be set up, then step and answer until the parent leaves."""
+        while not hasattr(self, "_motion"):
+            self._service.pending(None)
+            self._service.handle()
+        due = time.monotonic()
+        while True:
+            self._tick()
+            due += TICK
+            late = time.monotonic() - due
+            if late > LATEST:
+                _log.warning("the physics is %.2f s late: that time is given up", late)
+                due += late
+            while self._service.pending(max(0.0, due - time.monotonic())):
+                self._service.handle()
+                if time.monotonic() >= due:
+                    break
+
+    def _tick(self) -> None:
+        if not self._motion.tick(TICK):
+            return
+        for _ in range(STEPS):
+            for force, _ in self._pushes:
+                self._body.push(force)
+            self._pushes = [(force, left - STEP) for force, left in self._pushes if left > STEP]
+            self._bullet.stepSimulation()
+
+    def _fallen(self) -> bool:
+        pitch, roll = self._body.lean()
+        name, _ = self._motion.posture()
+        return name == "Unknown" and max(abs(pitch), abs(roll)) > FALLEN and not self._motion.moving()
+
+    def _push(self, force: Sequence[float], seconds: float) -> None:
+        x, y, z = (float(part) for part in force)
+        if not all(map(math.isfinite, (x, y, z))) or not 0 < seconds <= LIMIT:
+            raise Refused(f"cannot push: give finite newtons and more than 0, at most {LIMIT:g} s")
+        self._pushes.append(((x, y, z), seconds))
+
+    def _set_door(self, angle: float) -> None:
+        if not abs(angle) <= math.pi:
+            raise Refused("cannot turn the door: its opening angle is at most pi to each side")
+        self._door = float(angle)
+        self._scene.set_door(self._door)
+
+    def _set_lamp(self, level: float) -> None:
+        if not 0 <= level <= 1:
+            raise Refused("cannot set the lamp: its level is from 0 to 1")
+        self._lamp = float(level)
+
+    def _snapshot(self) -> dict[str, Any]:
+        position, orientation = self._body.base()
+        return {
+            "angles": self._body.angles(),
+            "position": position,
+            "orientation": orientation,
+            "door": self._door,
+            "lamp": self._lamp,
+        }
+
+
+def _pick(values: dict[str, float], names: Sequence[str]) -> list[float]:
+    unknown = [name for name in names if name not in values]
+    if unknown:
+        raise Refused(f"cannot find joint {unknown[0]!r}: known are {', '.join(values)}")
+    return [values[name] for name in names]
+
+
+if __name__ == "__main__":
+    sys.exit(serve(lambda service: Physics(service).run, sys.argv))
