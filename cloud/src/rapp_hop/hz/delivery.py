@@ -19,10 +19,11 @@ from rapp_hop.errors import Refused, Unreachable
 from rapp_hop.hz.install import Installed, PackageFile, RappFolder, install
 from rapp_hop.hz.manifest import Manifest
 from rapp_hop.hz.tar import Limits
-from rapp_hop.hz.trust import TrustedStore, newest
+from rapp_hop.hz.trust import Release, TrustedStore, newest
 from rapp_hop.streaming import Progress, Writer
 
 OnPhase = Callable[[str, dict[str, Any]], None]  # "downloading" | "verified" | "installed", and details
+_Tell = Callable[..., None]
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class Delivery:
         self._home = home
         self._limits = limits or DeliveryLimits()
         self.folder = RappFolder(home / "rapps")
+        self._one = asyncio.Lock()  # what was seen of the store has one writer
 
     async def install(self, name: str, version: str | None = None, on_phase: OnPhase | None = None) -> Installed:
         """Install a RApp, the newest version when none is named; one that is there already is not fetched again.
@@ -68,14 +70,15 @@ class Delivery:
             if on_phase is not None:
                 loop.call_soon_threadsafe(on_phase, phase, details)
 
-        work = asyncio.ensure_future(asyncio.to_thread(self._install, transport, name, version, tell))
-        try:
-            return await asyncio.shield(work)
-        except asyncio.CancelledError:
-            transport.cancel()
-            await asyncio.wait([work])
-            work.exception()  # taken: the caller asked for the end, not for its reason
-            raise
+        async with self._one:
+            work = asyncio.ensure_future(asyncio.to_thread(self._install, transport, name, version, tell))
+            try:
+                return await asyncio.shield(work)
+            except asyncio.CancelledError:
+                transport.cancel()
+                await asyncio.wait([work])
+                work.exception()  # taken: the caller asked for the end, not for its reason
+                raise
 
     async def remove(self, name: str) -> bool:
         """Remove a RApp; false when it was not there."""
@@ -85,25 +88,27 @@ class Delivery:
         """Return the manifests of the installed RApps by name."""
         return await asyncio.to_thread(self.folder.list)
 
-    def _install(self, transport: "_LoopTransport", name: str, version: str | None, tell: Callable[..., None]) -> Installed:
-        url = f"{self._client.base_url}/tuf"
-        store = TrustedStore(transport, url, self._root, self._home / "trust", self._limits.package)
-        release = newest(store.releases(), name, version)
-        present = self.folder.find(name, release.version.text)
-        if present is not None and self.folder.find(name) == present:
-            return present
-        tell("downloading", version=release.version.text, bytes=0, of=release.length)
+    def _install(self, transport: "_LoopTransport", name: str, version: str | None, tell: _Tell) -> Installed:
+        store = TrustedStore(transport, f"{self._client.base_url}/tuf", self._root, self._home / "trust", self._limits.package)
         try:
+            release = newest(store.releases(), name, version)
+            present = self.folder.find(name, release.version.text)
+            if present is not None and self.folder.find(name) == present:
+                return present
             aside = self._new_file()
-            source = PackageFile(aside, name, release.version.text, self._limits.package)
             try:
-                store.download(release, aside, lambda count, _: tell("downloading", bytes=count, of=release.length))
-                tell("verified", version=release.version.text)
-                done = install(source, self.folder)
+                return self._fetch(store, release, aside, tell)
             finally:
                 aside.unlink(missing_ok=True)
         except OSError as error:
             raise Refused(f"cannot install {name}: {error.strerror}, check the disk") from None
+
+    def _fetch(self, store: TrustedStore, release: Release, aside: Path, tell: _Tell) -> Installed:
+        name, version = release.name, release.version.text
+        tell("downloading", version=version, bytes=0, of=release.length)
+        store.download(release, aside, lambda count, _: tell("downloading", bytes=count, of=release.length))
+        tell("verified", version=version)
+        done = install(PackageFile(aside, name, version, self._limits.package), self.folder)
         tell("installed", version=done.version, path=str(done.path))
         return done
 

@@ -22,7 +22,7 @@ MAX_SENTENCE = 200  # characters
 MAX_LANGUAGES = 32
 MAX_PER_LANGUAGE = 64  # keywords or sentences
 RUNTIMES = ("python3",)
-_RAPP_KEYS = {"agent", "entry", "runtime", "keywords", "sentences", "permissions", "partner", "needs"}
+_RAPP_KEYS = {"agent", "entry", "runtime", "keywords", "sentences", "permissions", "partner", "needs", "parameters"}
 
 # The core agent's services, deliverable §4.5 in the names of DESIGN §3.1: what a RApp may ask to use.
 CORE_SERVICES = frozenset(
@@ -67,6 +67,7 @@ class Manifest:
     permissions: Permissions
     partner: str | None  # the other package of a four-agent RApp
     needs: Needs
+    parameters: Mapping[str, Any]  # handed to the program at its start; any JSON
 
 
 def parse_manifest(data: bytes) -> Manifest:
@@ -98,6 +99,7 @@ def parse_manifest(data: bytes) -> Manifest:
         permissions=_permissions(_object(rapp, "permissions", "rapp")),
         partner=None if partner is None else check_name(_text(rapp, "partner", "rapp")),
         needs=_needs(_object(rapp, "needs", "rapp")),
+        parameters=_object(rapp, "parameters", "rapp"),
     )
 
 

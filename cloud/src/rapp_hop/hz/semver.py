@@ -56,15 +56,23 @@ def check_condition(condition: str) -> None:
             raise Invalid(f"cannot read the condition {condition[:70]!r}: write it like >=1.0 or >=1.0, <2.0")
 
 
+def check_api(api: str) -> str:
+    """Return an API version that reads right.
+
+    :raises Invalid: when it is not MAJOR.MINOR
+    """
+    if not _API.fullmatch(api):
+        raise Invalid(f"cannot read the API version {api[:70]!r}: write it like 1.0")
+    return api
+
+
 def satisfies(api: str, condition: str) -> bool:
     """Tell whether API version `api` (MAJOR.MINOR) meets the condition.
 
     :raises Invalid: when one of them does not read right
     """
     check_condition(condition)
-    if not _API.fullmatch(api):
-        raise Invalid(f"cannot read the API version {api[:70]!r}: write it like 1.0")
-    have = tuple(int(part) for part in api.split("."))
+    have = tuple(int(part) for part in check_api(api).split("."))
     for part in condition.split(","):
         found = _CONDITION.fullmatch(part.strip())
         assert found is not None  # check_condition saw it

@@ -1,0 +1,93 @@
+"""`python -m rapp_cloud`: serve; `… init`: make a platform and a robot's token; `… publish`: offer a RApp."""
+
+import argparse
+import asyncio
+import json
+import logging
+import os
+import signal
+import sys
+from pathlib import Path
+
+from rapp_cloud.accounts import Accounts
+from rapp_cloud.app import open_shelf, running_cloud
+from rapp_cloud.config import CloudConfig, load_config
+from rapp_cloud.files import write_whole
+from rapp_cloud.profiles import Profile, Profiles
+from rapp_hop.errors import HopError
+from rapp_hop.hz.archive import build
+from rapp_hop.hz.text import check_name
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run the command that the words name; return its exit status."""
+    words = sys.argv[1:] if words is None else words
+    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s")
+    commands = {"init": _init, "publish": _publish}
+    try:
+        if words and words[0] in commands:
+            return commands[words[0]](words[1:])
+        return asyncio.run(_serve(_options(words)))
+    except HopError as error:
+        print(error, file=sys.stderr)
+    except OSError as error:
+        print(f"cannot use {error.filename}: {error.strerror}", file=sys.stderr)
+    return 1
+
+
+def _options(words: list[str]) -> CloudConfig:
+    parser = argparse.ArgumentParser("python -m rapp_cloud", description="The RAPP platform; commands: init, publish.")
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="made by `init`")
+    parser.add_argument("--port", type=int, help="0: any free one")
+    parser.add_argument("--address", help="to listen on")
+    parser.add_argument("--publish", action="append", metavar="DIR", help="source of a RApp to offer; may be repeated")
+    parser.add_argument("--token-file", type=Path, metavar="FILE", help="default: DIR/tokens.json")
+    parser.add_argument("--workers", type=int, help="processes for interpretation")
+    options = vars(parser.parse_args(words))
+    return load_config(options.pop("data"), options, os.environ)
+
+
+async def _serve(config: CloudConfig) -> int:
+    stop = asyncio.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    async with running_cloud(config) as port:
+        print("READY " + json.dumps({"port": port}), flush=True)
+        await stop.wait()
+    return 0
+
+
+def _init(words: list[str]) -> int:
+    parser = argparse.ArgumentParser("python -m rapp_cloud init", description="Make keys, a store, a robot's token.")
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--robot", required=True, metavar="NAME")
+    options = parser.parse_args(words)
+    data, robot = options.data, check_name(options.robot)
+    data.mkdir(parents=True, exist_ok=True, mode=0o700)
+    shelf = open_shelf(data)
+    if not shelf.root_file.exists():
+        shelf.create()
+    write_whole(data / "root.json", shelf.root_file.read_bytes())
+    token_file = data / "robots" / f"{robot}.token"
+    if not token_file.exists():
+        token_file.parent.mkdir(exist_ok=True, mode=0o700)
+        write_whole(token_file, Accounts(data / "tokens.json").add(robot).encode(), mode=0o600)
+    if not (data / "profiles" / f"{robot}.json").exists():
+        Profiles(data / "profiles").put(robot, Profile(robot, "en", ()))
+    print(f"give to the robot: {token_file} and {data / 'root.json'}")
+    return 0
+
+
+def _publish(words: list[str]) -> int:
+    parser = argparse.ArgumentParser("python -m rapp_cloud publish", description="Build, sign and offer RApps.")
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR")
+    parser.add_argument("sources", nargs="+", type=Path, metavar="FOLDER")
+    options = parser.parse_args(words)
+    for folder in options.sources:
+        manifest = open_shelf(options.data).publish(build(folder))
+        print(f"on offer: {manifest.name} {manifest.version}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,101 @@
+"""The platform put together: parts made from one config, started, served, ended in reverse order."""
+
+import asyncio
+import functools
+import logging
+import shutil
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from rapp_cloud.accounts import Accounts
+from rapp_cloud.config import CloudConfig
+from rapp_cloud.interpreter.port import Commands, Interpretation, Interpreter
+from rapp_cloud.profiles import Profiles
+from rapp_cloud.reports import Reports
+from rapp_cloud.robots import Robots
+from rapp_cloud.services.people import people_services
+from rapp_cloud.services.presence import presence_services
+from rapp_cloud.services.runs import run_services
+from rapp_cloud.services.voice import voice_services
+from rapp_cloud.shelf import Shelf
+from rapp_cloud.static import FILE_PATTERN, StoreFiles
+from rapp_hop.errors import HopError
+from rapp_hop.hz.archive import build
+from rapp_hop.server import HopServer
+from rapp_hop.service import ServiceRegistry
+from rapp_hop.workers import Workers
+
+_log = logging.getLogger(__name__)
+
+
+def open_shelf(data: Path) -> Shelf:
+    """Return the store of a data folder."""
+    return Shelf(data / "tuf", data / "keys")
+
+
+def load_interpreter() -> Interpreter:
+    """Load the interpreter; runs in a worker process, so only there its models and libraries are loaded."""
+    from rapp_cloud.interpreter.hearing import make_interpreter
+
+    return make_interpreter()
+
+
+@asynccontextmanager
+async def running_cloud(config: CloudConfig) -> AsyncIterator[int]:
+    """Start the platform and give its port; end it when the block ends.
+
+    :raises HopError: when the store, a source to publish or the port is not as it must be
+    """
+    shelf = open_shelf(config.data)
+    await asyncio.to_thread(_prepare, shelf, config)
+    workers = Workers(load_interpreter, config.workers)
+    server = HopServer(_registry(config, shelf, workers), Accounts(config.tokens).robot_of, config.data / "uploads", [
+        (rf"/tuf/metadata/{FILE_PATTERN}", StoreFiles, {"path": str(shelf.metadata)}),
+        (rf"/tuf/targets/{FILE_PATTERN}", StoreFiles, {"path": str(shelf.targets)}),
+    ])  # fmt: skip
+    refreshing = asyncio.create_task(_keep_fresh(shelf, config.refresh))
+    try:
+        await workers.start()
+        yield server.listen(config.port, config.address)
+    finally:
+        refreshing.cancel()
+        await asyncio.gather(refreshing, return_exceptions=True)
+        await server.close()
+        await workers.close()
+
+
+def _prepare(shelf: Shelf, config: CloudConfig) -> None:
+    shutil.rmtree(config.data / "uploads", ignore_errors=True)  # of calls that a crash cut short
+    shelf.refresh()
+    for folder in config.publish:
+        manifest = shelf.publish(build(folder))
+        _log.info("on offer: %s %s", manifest.name, manifest.version)
+
+
+def _registry(config: CloudConfig, shelf: Shelf, workers: Workers) -> ServiceRegistry:
+    robots = Robots(time.monotonic, config.lease)
+    run = functools.partial(_interpret, workers, config.interpret_timeout)
+    return ServiceRegistry(
+        [
+            *presence_services(robots, shelf),
+            *people_services(Profiles(config.data / "profiles")),
+            *run_services(Reports(config.data / "reports")),
+            *voice_services(robots, shelf, run),
+        ]
+    )
+
+
+async def _interpret(workers: Workers, timeout: float, recording: Path, commands: Commands, language: str) -> Interpretation:
+    found: Interpretation = await workers.run("interpret", recording, commands, language, timeout=timeout)
+    return found
+
+
+async def _keep_fresh(shelf: Shelf, period: float) -> None:
+    while True:
+        await asyncio.sleep(period)
+        try:
+            await asyncio.to_thread(shelf.refresh)
+        except (HopError, OSError) as error:
+            _log.error("cannot sign a new timestamp: %s", error)

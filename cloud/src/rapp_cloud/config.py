@@ -1,0 +1,72 @@
+"""The platform's settings, in one screen: defaults, then `<data>/cloud.toml`, then the environment, then options."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from rapp_hop.errors import Invalid
+
+FILE = "cloud.toml"
+PREFIX = "RAPP_CLOUD_"
+
+
+@dataclass(frozen=True)
+class CloudConfig:
+    """One platform."""
+
+    data: Path  # everything the platform keeps
+    address: str = "127.0.0.1"  # to listen on
+    port: int = 9001  # 0: any free one
+    token_file: Path | None = None  # None: <data>/tokens.json
+    publish: tuple[Path, ...] = ()  # sources of RApps to offer at start
+    workers: int = os.cpu_count() or 1  # processes for interpretation
+    interpret_timeout: float = 30.0  # seconds for one sentence
+    lease: float = 15.0  # seconds without a heartbeat until a robot counts as gone
+    refresh: float = 3600.0  # seconds between two new timestamps of the store
+
+    @property
+    def tokens(self) -> Path:
+        """The file of tokens."""
+        return self.token_file or self.data / "tokens.json"
+
+
+def load_config(data: Path, options: Mapping[str, Any], environment: Mapping[str, str]) -> CloudConfig:
+    """Return the settings; an option that is None was not given.
+
+    :raises Invalid: when a setting is unknown or of another type
+    """
+    given: dict[str, Any] = {}
+    path = data / FILE
+    if path.exists():
+        try:
+            given |= tomllib.loads(path.read_text("utf-8"))
+        except (OSError, ValueError) as error:
+            raise Invalid(f"cannot read {path}: {error}") from None
+    names = {field.name for field in fields(CloudConfig)} - {"data"}
+    for name in names:
+        if PREFIX + name.upper() in environment:
+            text = environment[PREFIX + name.upper()]
+            given[name] = text.split(os.pathsep) if name == "publish" else text
+    given |= {name: value for name, value in options.items() if value is not None}
+    strange = sorted(set(given) - names)
+    if strange:
+        raise Invalid(f"cannot use the setting {strange[0]!r}: known are {', '.join(sorted(names))}")
+    return replace(CloudConfig(data), **{name: _typed(name, value) for name, value in given.items()})
+
+
+def _typed(name: str, value: Any) -> Any:
+    if name == "publish":
+        if not isinstance(value, list):
+            raise Invalid("cannot use the setting publish: it must be a list of folders")
+        return tuple(Path(item) for item in value)
+    kind: type[Any] = {"address": str, "token_file": Path, "port": int, "workers": int}.get(name, float)
+    try:
+        found = kind(value)
+    except (TypeError, ValueError):
+        raise Invalid(f"cannot use {value!r} as the setting {name}: it must be of type {kind.__name__}") from None
+    if kind in (int, float) and not 0 <= found <= 1e6:
+        raise Invalid(f"cannot use {value!r} as the setting {name}: it must be within 0 and 1000000")
+    return found

@@ -1,0 +1,58 @@
+"""Which robots are here: a registration is a lease that heartbeats renew. Pure but for the clock handed in."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rapp_cloud.catalogue import RobotKind
+from rapp_hop.errors import Refused
+
+LEASE = 15.0  # seconds without a heartbeat after which a robot counts as gone
+
+
+@dataclass(frozen=True)
+class _Registration:
+    kind: RobotKind
+    until: float  # seconds of the clock
+
+
+class Robots:
+    """The registered robots of one platform."""
+
+    def __init__(self, clock: Callable[[], float], lease: float = LEASE) -> None:
+        """Begin with none.
+
+        :param clock: seconds, never going back
+        :param lease: seconds
+        """
+        self._clock = clock
+        self.lease = lease
+        self._robots: dict[str, _Registration] = {}
+
+    def register(self, robot: str, kind: RobotKind) -> None:
+        """Note that a robot is here and what it is; again is fine."""
+        self._robots[robot] = _Registration(kind, self._clock() + self.lease)
+
+    def heartbeat(self, robot: str) -> bool:
+        """Renew a lease; false when there is none to renew, so that the robot registers again."""
+        found = self._alive(robot)
+        if found is None:
+            return False
+        self.register(robot, found.kind)
+        return True
+
+    def kind_of(self, robot: str) -> RobotKind:
+        """Return what a robot is.
+
+        :raises Refused: when it is not registered now
+        """
+        found = self._alive(robot)
+        if found is None:
+            raise Refused(f"cannot serve {robot}: it is not registered, call register first")
+        return found.kind
+
+    def _alive(self, robot: str) -> _Registration | None:
+        found = self._robots.get(robot)
+        if found is not None and found.until <= self._clock():
+            del self._robots[robot]
+            return None
+        return found
