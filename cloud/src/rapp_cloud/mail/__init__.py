@@ -1,1 +1,4 @@
-"""The embedded mail server: SMTP in, a Maildir out; each Message-ID is delivered once (paper Fig. 12, the "Gmail server")."""
+"""The embedded mail server: SMTP in (RFC 5321, STARTTLS, AUTH), a Maildir out.
+
+The paper's "Gmail server" as cloud agent of the voice-mail RApp (paper §IV); a real account takes its place by option.
+"""

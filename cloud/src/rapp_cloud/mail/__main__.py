@@ -1,4 +1,4 @@
-"""Entry point of the mail server: serves until SIGINT or SIGTERM."""
+"""Entry point: reads the settings, serves SMTP until SIGINT or SIGTERM."""
 
 import asyncio
 import json
@@ -6,28 +6,42 @@ import logging
 import signal
 import sys
 
-from rapp_cloud.mail.config import MailConfig, read
-from rapp_cloud.mail.maildir import Maildir
-from rapp_cloud.mail.server import make_smtp
+from rapp_cloud.mail.config import Config, read
+from rapp_cloud.mail.errors import MailError
+from rapp_cloud.mail.server import MailServer
+from rapp_cloud.mail.users import add_user
+
+_log = logging.getLogger("rapp_cloud.mail")
 
 
 def main() -> int:
-    """Run the server; gives the exit status."""
+    """Run the mail server; gives the exit status."""
+    config = read(sys.argv[1:])
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s", stream=sys.stderr)
-    asyncio.run(_serve(read(sys.argv[1:])))
+    logging.getLogger("mail.log").setLevel(logging.WARNING)  # aiosmtpd writes every command, AUTH among them
+    try:
+        if config.add_user and config.users_file:
+            add_user(config.users_file, config.add_user, sys.stdin.readline().rstrip("\n"))
+        else:
+            asyncio.run(_serve(config))
+    except MailError as error:
+        _log.error("%s", error)
+        return 1
     return 0
 
 
-async def _serve(config: MailConfig) -> None:
+async def _serve(config: Config) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stop.set)
-    maildir = Maildir(config.maildir)
-    server = await loop.create_server(lambda: make_smtp(config, maildir), config.address, config.port)
-    print("READY " + json.dumps({"port": server.sockets[0].getsockname()[1]}), flush=True)
-    await stop.wait()
-    server.close()
+    server = MailServer(config)
+    port = await server.start()
+    try:
+        print("READY " + json.dumps({"port": port}), flush=True)
+        await stop.wait()
+    finally:
+        await server.stop()
 
 
 if __name__ == "__main__":
