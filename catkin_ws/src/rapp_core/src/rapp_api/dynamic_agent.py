@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 from rapp_agent import Behaviour, Edge, Event, Machine, Subsystem
-
 from rapp_api.core_agent import activity
 
 

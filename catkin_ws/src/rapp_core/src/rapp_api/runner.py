@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import rospy
-from rapp_agent import Event
 
+from rapp_agent import Event
 from rapp_api import core_agent
 from rapp_api.dynamic_agent import DynamicAgent
 from rapp_api.errors import Invalid

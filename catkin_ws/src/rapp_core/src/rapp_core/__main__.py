@@ -9,8 +9,8 @@ import threading
 import time
 
 import rospy
-from rapp_agent import Subsystem
 
+from rapp_agent import Subsystem
 from rapp_core.config import Config, read
 from rapp_core.control.control import Control, Parts
 from rapp_core.control.fsm import core_machine

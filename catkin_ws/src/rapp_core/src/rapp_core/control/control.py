@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from rapp_agent import Subsystem
-
 from rapp_core.config import Config
 from rapp_core.control.lease import Lease
 from rapp_core.control.listening import Listener

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from rapp_agent import Buffer, Machine, Subsystem
-
 from rapp_core.config import Config
 from rapp_core.errors import CoreError, Refused
 from rapp_core.ports import Robot

@@ -4,7 +4,6 @@ import math
 from pathlib import Path
 
 from rapp_agent import Behaviour, Machine, Subsystem
-
 from rapp_core.errors import Invalid
 from rapp_core.services.context import Context, request
 

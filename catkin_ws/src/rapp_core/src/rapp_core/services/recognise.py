@@ -1,7 +1,6 @@
 """rapp_recognize: wordSpotting of the deliverable, paper Fig. 6."""
 
 from rapp_agent import Behaviour, Edge, Machine, Subsystem
-
 from rapp_core.errors import Invalid
 from rapp_core.ports import Word
 from rapp_core.services.context import Context, reply, request

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from rapp_agent import Behaviour, Edge, Machine, Subsystem
 from rapp_agent.behaviour import Condition, Transition
-
 from rapp_core.errors import Invalid
 from rapp_core.services.context import Context, reply, request
 

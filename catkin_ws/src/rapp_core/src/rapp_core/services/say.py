@@ -1,7 +1,6 @@
 """rapp_say: textToSpeech of the deliverable, paper Fig. 5."""
 
 from rapp_agent import Behaviour, Machine, Subsystem
-
 from rapp_core.errors import Invalid
 from rapp_core.services.context import Context, request
 

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rapp_agent import Machine
-
 from rapp_core.services import play, recognise, record, say
 from rapp_core.services.context import Context
 
