@@ -22,7 +22,8 @@ from pathlib import Path
 import numpy as np
 import soundfile
 from numpy.typing import NDArray
-from rapp_cloud.interpreter import interpret_recording
+
+from rapp_cloud.interpreter.hearing import interpret_recording
 
 SENTENCES = Path(__file__).with_name("interpret_sentences.json")
 NOISES = (20, 10, 5, 0)  # dB, speech to noise over the speech

@@ -86,7 +86,8 @@ class Beam:
         return self._done or self._open
 
     def _likely(self, row: Row, chances: NDArray[np.float32]) -> set[int]:
-        likeliest = set(np.argpartition(chances, -self._width)[-self._width :].tolist())
+        width = min(self._width, len(chances))
+        likeliest = set(np.argpartition(chances, -width)[-width:].tolist())
         return likeliest | set(self._expected.following) | set(row.place.following if row.place else ())
 
     def _grow(self, row: Row, piece: int, chance: float) -> Row:

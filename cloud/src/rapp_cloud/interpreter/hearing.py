@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from rapp_hop.errors import Refused
-
 from rapp_cloud.interpreter.beam import Expected
 from rapp_cloud.interpreter.config import InterpreterConfig
+from rapp_cloud.interpreter.errors import Refused
 from rapp_cloud.interpreter.matching import chances, match
 from rapp_cloud.interpreter.meaning import SentenceModel, weights_file
 from rapp_cloud.interpreter.port import Commands, Interpretation

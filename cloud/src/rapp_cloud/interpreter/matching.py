@@ -65,7 +65,7 @@ def _mean_of_best(cosines: NDArray[Any], config: InterpreterConfig) -> float:
 
 def _confidence(nearness: dict[str, float], name: str, config: InterpreterConfig) -> float:
     rivals = [value for other, value in nearness.items() if other != name]
-    # the regression knows margins of the best only; one behind its rival gets no more than no margin
-    margin = max(0.0, nearness[name] - max(rivals, default=0.0))
+    # the regression knows margins of the best only: one behind its rival, or without any, gets no margin
+    margin = max(0.0, nearness[name] - max(rivals, default=nearness[name]))
     evidence = config.nearness_weight * nearness[name] + config.margin_weight * margin + config.offset
     return 1.0 / (1.0 + math.exp(-evidence))

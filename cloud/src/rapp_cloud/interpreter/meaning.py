@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
-from rapp_hop.errors import Bug
 
+from rapp_cloud.interpreter.errors import Bug
 from rapp_cloud.interpreter.words import plain
 
 _SHA256 = "8199be6f699a395f99f89df973f9dc5285fbcfcdb2ae1a4e1201dab014f3d2a6"

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import soundfile
 from numpy.typing import NDArray
-from rapp_hop.errors import Invalid
+
+from rapp_cloud.interpreter.errors import Invalid
 
 Sound = NDArray[np.float32]
 

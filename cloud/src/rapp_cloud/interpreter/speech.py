@@ -14,15 +14,17 @@ from typing import Any
 import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
-from rapp_hop.errors import Bug
 
 from rapp_cloud.interpreter.beam import Beam, Expected, Row, expect
+from rapp_cloud.interpreter.errors import Bug
 from rapp_cloud.interpreter.sound import RATE, Sound
 from rapp_cloud.interpreter.tokens import END, START, Vocabulary, read_vocabulary
 
 _LAYERS, _HEADS, _WIDTH = 6, 8, 36
 _PIECES_PER_SECOND = 6.5
 """More than anyone speaks; Moonshine's own bound against texts that repeat themselves."""
+_SHORTEST = RATE // 5
+"""Samples; a word takes longer, and the encoder needs about a third of it."""
 
 Floats = NDArray[np.float32]
 
@@ -72,6 +74,8 @@ class Recogniser:
 
     def listen(self, sound: Sound, beam: int, expected: Expected, bonus: float) -> tuple[Heard, ...]:
         """The likeliest texts of a 16 kHz sound, best first, at most `beam`; `bonus` nats a piece for `expected` words."""
+        if len(sound) < _SHORTEST:
+            return ()
         longest = max(8, int(len(sound) / RATE * _PIECES_PER_SECOND))
         search = Beam(beam, START, END, expected, bonus)
         encoded = self._encode(sound)

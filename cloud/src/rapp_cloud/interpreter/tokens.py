@@ -7,7 +7,7 @@ first, from 128 on). Pieces begin with "▁" where a word begins; the numbers ar
 from collections.abc import Sequence
 from pathlib import Path
 
-from rapp_hop.errors import Bug
+from rapp_cloud.interpreter.errors import Bug
 
 START, END = 1, 2
 """Numbers of the marks before the first and after the last piece."""

@@ -21,8 +21,9 @@ _STRANGE_WORD = 1.2
 
 
 def plain(text: str) -> str:
-    """Lower-case letters, apostrophes and single blanks; "e-mail" becomes "e mail"."""
-    return " ".join(re.findall(r"[a-z']+", text.lower()))
+    """Lower-case letters, apostrophes and single blanks; "e-mail" is "email", as the speech model writes it."""
+    joined = re.sub(r"\be[- ]mail", "email", text.lower())
+    return " ".join(re.findall(r"[a-z']+", joined))
 
 
 def content_words(sentences: Sequence[str]) -> list[str]:

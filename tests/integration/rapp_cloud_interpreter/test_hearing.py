@@ -1,0 +1,91 @@
+"""The interpreter with its real models and synthesised speech."""
+
+import io
+import pickle
+import subprocess
+
+import numpy as np
+import pytest
+import soundfile
+
+from rapp_cloud.interpreter.errors import Refused
+from rapp_cloud.interpreter.hearing import interpret_recording, make_interpreter
+
+COMMANDS = {
+    "voice_mail": ["send an e-mail", "send a message to my daughter", "write a mail to a friend"],
+    "clock": ["what time is it", "tell me the time"],
+    "weather": ["what is the weather like today", "will it rain tomorrow"],
+}
+
+
+@pytest.fixture(scope="module")
+def interpreter():
+    return make_interpreter()
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """Makes a recording of a sentence at 20 dB as the robot would: ogg, with noise around it."""
+
+    def record(text, voice="en-us+m3"):
+        words = ["espeak-ng", "--stdout", "-v", voice, "-s", "150", "--", text]
+        sound = subprocess.run(words, stdout=subprocess.PIPE, check=True, timeout=20).stdout
+        speech, rate = soundfile.read(io.BytesIO(sound))
+        samples = np.concatenate([np.zeros(rate // 2), 0.5 * speech, np.zeros(rate // 2)])
+        level = 0.1 * np.sqrt(np.mean((0.5 * speech) ** 2))
+        samples += level * np.random.default_rng(3).standard_normal(len(samples))
+        file = tmp_path / "command.ogg"
+        soundfile.write(file, np.clip(samples, -1, 1), rate, format="OGG", subtype="VORBIS")
+        return file
+
+    return record
+
+
+@pytest.mark.parametrize("voice", ["en-us+m3", "en-us+f2"])
+def test_paraphrase_names_its_rapp(interpreter, recording, voice):
+    found = interpreter.interpret(recording("I would like to send a message to my son", voice), COMMANDS)
+    assert found.rapp == "voice_mail"
+    assert found.confidence > 0.75
+    assert "message" in found.text
+
+
+def test_foreign_sentence_names_none(interpreter, recording):
+    found = interpreter.interpret(recording("the old castle stands on a hill above the town"), COMMANDS)
+    assert found.rapp is None
+    assert found.confidence < 0.5
+    assert "castle" in found.text
+
+
+@pytest.mark.parametrize("level", [0.0, 0.05])
+def test_silence_and_noise_name_none(interpreter, tmp_path, level):
+    file = tmp_path / "noise.wav"
+    soundfile.write(file, level * np.random.default_rng(2).standard_normal(48000), 16000)
+    assert interpreter.interpret(file, COMMANDS).rapp is None
+
+
+def test_very_short_sound_names_none(interpreter, tmp_path):
+    file = tmp_path / "click.wav"
+    soundfile.write(file, np.array([0.0, 0.5, -0.5]), 16000)
+    assert interpreter.interpret(file, COMMANDS).rapp is None
+
+
+def test_empty_catalogue_names_none(interpreter, recording):
+    found = interpreter.interpret(recording("what time is it"), {})
+    assert (found.rapp, found.candidates) == (None, ())
+
+
+def test_other_language_is_refused_by_name(interpreter, recording):
+    with pytest.raises(Refused, match=r"^cannot interpret language 'pl': offered are en"):
+        interpreter.interpret(recording("what time is it"), COMMANDS, "pl")
+
+
+def test_set_up_and_function_travel_to_worker_processes():
+    assert pickle.loads(pickle.dumps(make_interpreter)) is make_interpreter
+    assert pickle.loads(pickle.dumps(interpret_recording)) is interpret_recording
+
+
+def test_result_and_error_survive_pickling(interpreter, recording):
+    found = interpreter.interpret(recording("what time is it"), COMMANDS)
+    assert pickle.loads(pickle.dumps(found)) == found
+    error = pickle.loads(pickle.dumps(Refused("cannot")))
+    assert (error.kind, str(error)) == ("refused", "cannot")
