@@ -45,11 +45,11 @@ def parse_multipart(body: bytes, boundary: str) -> list[Part]:
     """
     if not re.fullmatch(r"[0-9a-zA-Z'()+_,./:=? -]{1,70}", boundary, re.ASCII):
         raise Invalid("cannot read multipart: its boundary is missing or wrong")
-    mark = b"--" + boundary.encode()
-    if not body.startswith(mark):
+    # With a line end in front every boundary looks the same; one that goes on in other letters is none.
+    marks = re.compile(rb"\r\n--" + re.escape(boundary.encode()) + rb"(?=\r\n|--)")
+    start, *pieces = marks.split(b"\r\n" + body, MAX_PARTS + 1)
+    if start or not pieces:
         raise Invalid("cannot read multipart: it does not begin with its boundary")
-    pieces = body.split(b"\r\n" + mark, MAX_PARTS + 1)
-    pieces[0] = pieces[0][len(mark) :]
     if pieces[-1].rstrip(b"\r\n") != b"--":
         raise Invalid(f"cannot read multipart: cut off, or more than {MAX_PARTS} parts")
     return [_part(piece) for piece in pieces[:-1]]

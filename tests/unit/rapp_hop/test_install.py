@@ -1,0 +1,109 @@
+"""Installed RApps appear whole or not at all; the version before stays."""
+
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from fakes.packages import source_folder
+
+from rapp_hop.errors import Invalid, Refused
+from rapp_hop.hz.archive import build
+from rapp_hop.hz.install import PackageFile, RappFolder, install
+from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.tar import Limits
+
+
+def package(folder: Path, version: str, name: str = "hello", says: str | None = None) -> PackageFile:
+    path = folder / f"{name}-{version}.hz"
+    path.write_bytes(build(source_folder(folder / "src", name, version, f"print({version!r})\n")))
+    return PackageFile(path, name, says or version, Limits())
+
+
+@dataclass
+class Failing:
+    """A source that stops in the middle, as a full disk would."""
+
+    name: str = "hello"
+    version: str = "1.1.0"
+
+    def unpack(self, folder: Path) -> Manifest:
+        folder.mkdir()
+        (folder / "agent.py").write_text("half")
+        raise OSError(28, "No space left on device")
+
+
+@pytest.fixture
+def rapps(tmp_path: Path) -> RappFolder:
+    return RappFolder(tmp_path / "rapps")
+
+
+def test_install_find_list_remove(rapps: RappFolder, tmp_path: Path) -> None:
+    done = install(package(tmp_path, "1.0.0"), rapps)
+    assert done.new
+    assert done.path == tmp_path / "rapps" / "hello" / "1.0.0"
+    assert (tmp_path / "rapps" / "hello" / "current" / "agent.py").read_text() == "print('1.0.0')\n"
+    assert rapps.list()["hello"].version.text == "1.0.0"
+    assert rapps.remove("hello")
+    assert not rapps.remove("hello")
+    assert rapps.find("hello") is None
+    assert rapps.list() == {}
+
+
+def test_again_is_not_new(rapps: RappFolder, tmp_path: Path) -> None:
+    source = package(tmp_path, "1.0.0")
+    assert install(source, rapps).new
+    assert not install(source, rapps).new
+
+
+def test_the_version_before_is_kept_older_ones_go_and_back_is_possible(rapps: RappFolder, tmp_path: Path) -> None:
+    for version in ("1.0.0", "1.1.0", "1.2.0"):
+        install(package(tmp_path, version), rapps)
+    kept = sorted(path.name for path in (tmp_path / "rapps" / "hello").iterdir() if not path.is_symlink())
+    assert kept == ["1.1.0", "1.2.0"]
+    assert rapps.go_back("hello").version == "1.1.0"
+    assert rapps.find("hello", "1.2.0") is None
+    with pytest.raises(Refused, match="no version before"):
+        rapps.go_back("hello")
+
+
+def test_s17_a_full_disk_leaves_what_was(rapps: RappFolder, tmp_path: Path) -> None:
+    install(package(tmp_path, "1.0.0"), rapps)
+    with pytest.raises(Refused, match="free some space"):
+        install(Failing(), rapps)
+    assert rapps.list()["hello"].version.text == "1.0.0"
+    assert sorted(path.name for path in rapps.root.iterdir()) == [".lock", "hello"]
+
+
+def test_p25_the_package_must_be_who_was_asked_for(rapps: RappFolder, tmp_path: Path) -> None:
+    with pytest.raises(Invalid, match=r"the package says it is hello 1\.0\.0"):
+        install(package(tmp_path, "1.0.0", says="2.0.0"), rapps)
+    assert rapps.list() == {}
+
+
+def test_what_a_power_cut_left_is_swept_up(rapps: RappFolder, tmp_path: Path) -> None:
+    (tmp_path / "rapps" / ".aside-dead").mkdir(parents=True)
+    install(package(tmp_path, "1.0.0"), rapps)
+    assert not (tmp_path / "rapps" / ".aside-dead").exists()
+
+
+def test_names_cannot_lead_out(rapps: RappFolder, tmp_path: Path) -> None:
+    (tmp_path / "precious").mkdir()
+    for name in ("../precious", "/", ".", "..", ".lock"):
+        with pytest.raises(Invalid):
+            rapps.remove(name)
+        with pytest.raises(Invalid):
+            rapps.find(name)
+    assert (tmp_path / "precious").is_dir()
+
+
+def test_s19_two_installations_at_once(rapps: RappFolder, tmp_path: Path) -> None:
+    source = package(tmp_path, "1.0.0")
+    new: list[bool] = []
+    threads = [threading.Thread(target=lambda: new.append(install(source, rapps).new)) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(new) == [False] * 5 + [True]
+    assert rapps.find("hello") is not None
