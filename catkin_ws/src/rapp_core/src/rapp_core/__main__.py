@@ -33,7 +33,7 @@ _log = logging.getLogger(__name__)
 
 def main() -> int:
     """Run the core agent; gives the exit status."""
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s", stream=sys.stderr)
+    _log_to_stderr()
     try:
         config = read(sys.argv[1:])
     except Invalid as error:
@@ -43,9 +43,18 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     rospy.init_node("core_agent", disable_signals=True)
+    _log_to_stderr()
     _run(config, stop)
     rospy.signal_shutdown("the core agent ends")
     return 0
+
+
+def _log_to_stderr() -> None:
+    """Also after rospy has put its own handlers in place of everybody's."""
+    line = "%(asctime)s %(name)s %(levelname)s %(message)s"
+    logging.basicConfig(level=logging.INFO, format=line, stream=sys.stderr, force=True)
+    for logger in map(logging.getLogger, list(logging.root.manager.loggerDict)):
+        logger.disabled = False
 
 
 def _run(config: Config, stop: threading.Event) -> None:

@@ -40,6 +40,10 @@ class RosHop:
         """See `ports.Hop`."""
         return time.monotonic() - self._alive < SILENCE
 
+    def _reachable(self) -> bool:
+        """Whether the link is there and its events would arrive: each topic is connected by itself."""
+        return self.present and self._subscribers[0].get_num_connections() > 0
+
     def request(self, name: str, arguments: Mapping[str, Any], timeout: float, progress: Progress | None = None) -> Any:
         """See `ports.Hop`."""
         deadline = time.monotonic() + timeout
@@ -59,7 +63,7 @@ class RosHop:
                 del self._jobs[job]
 
     def _wait_present(self, until: float) -> None:
-        while not self.present:
+        while not self._reachable():
             if time.monotonic() > until:
                 raise Unreachable(GONE)
             time.sleep(STEP)
