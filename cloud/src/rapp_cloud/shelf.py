@@ -151,11 +151,11 @@ class Shelf:
     def _state(self) -> tuple[Timestamp, Snapshot, Targets]:
         """Return what is on offer now, as copies that may be changed."""
         try:
-            timestamp = Metadata[Timestamp].from_file(str(self.metadata / "timestamp.json")).signed
+            timestamp = Metadata[Timestamp].from_bytes((self.metadata / "timestamp.json").read_bytes()).signed
             version = timestamp.snapshot_meta.version
-            snapshot = Metadata[Snapshot].from_file(str(self.metadata / f"{version}.snapshot.json")).signed
+            snapshot = Metadata[Snapshot].from_bytes((self.metadata / f"{version}.snapshot.json").read_bytes()).signed
             version = snapshot.meta["targets.json"].version
-            targets = Metadata[Targets].from_file(str(self.metadata / f"{version}.targets.json")).signed
+            targets = Metadata[Targets].from_bytes((self.metadata / f"{version}.targets.json").read_bytes()).signed
         except (OSError, RepositoryError, KeyError) as error:
             raise Refused(f"cannot read the store in {self.metadata.parent}: {error}, run rapp_cloud init") from None
         return timestamp, snapshot, targets
