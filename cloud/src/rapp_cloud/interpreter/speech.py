@@ -49,7 +49,7 @@ def model_folder() -> Path:
         raise Bug("cannot find the speech model: install moonshine-voice 0.0.59 (./rapp does it)")
     folder = Path(spec.origin).parent / "assets" / "tiny-en"
     if not (folder / "encoder_model.ort").is_file():
-        raise Bug("cannot find the weights in moonshine-voice: later versions leave them out, install 0.0.59")
+        raise Bug("cannot find the weights in moonshine-voice: 0.1.5 leaves them out, install 0.0.59")
     return folder
 
 
