@@ -1,71 +1,110 @@
-"""Entry point of the link: builds the parts, serves until SIGINT or SIGTERM."""
+"""Entry point: reads the settings, joins rosbridge, platform and mail server until SIGINT or SIGTERM."""
 
 import asyncio
 import json
 import logging
+import os
 import signal
 import sys
+import threading
+import uuid
+from pathlib import Path
 
 from rapp_hop.client import HopClient
+from rapp_hop.errors import HopError, Refused
 from rapp_hop.hz.delivery import Delivery
-from rapp_link import smtp
-from rapp_link.commands import Commands
+from rapp_link.cloud_side import Platform
+from rapp_link.commands import Commands, sign_of_life
 from rapp_link.config import Config, read
-from rapp_link.jobs import Jobs
+from rapp_link.jobs import JobTable
+from rapp_link.office import Office
 from rapp_link.outbox import Outbox
+from rapp_link.postman import Postman
 from rapp_link.reports import Reports
 from rapp_link.ros_side import RosSide
+from rapp_link.smtp import SmtpSender
 
-_log = logging.getLogger(__name__)
+LAST_WORD = 1.8  # seconds from the signal to the end, whatever a thread still does
+
+_log = logging.getLogger("rapp_link")
+
+
+class Link:
+    """All parts of the link, built from its settings."""
+
+    def __init__(self, config: Config) -> None:
+        """Build inside a running loop; opens no connection yet.
+
+        :raises HopError: a setting is wrong or the disk refuses
+        """
+        own = config.home / "link"
+        _make_home(own)
+        self.config = config
+        self.boot = uuid.uuid4().hex
+        self.client = HopClient(config.cloud, config.token or None)
+        reports = Reports(own / "reports")
+        outbox = Outbox(own / "outbox", config.mail.waiting)
+        self.platform = Platform(self.client, config, reports)
+        self.postman = Postman(outbox, SmtpSender(config.mail), config.mail)
+        delivery = Delivery(self.client, config.root, config.home) if config.root else None
+        commands = Commands(config, self.platform, delivery, outbox, self.postman, reports).table()
+        self.office = Office(JobTable(config.jobs, config.longest), commands, lambda event: self.ros.tell(event))
+        self.ros = RosSide(config.bridge, list(commands), self.office.request, self.office.cancel)
+
+    async def run(self, stop: asyncio.Event) -> None:
+        """Serve until `stop` is set."""
+        self.ros.open()
+        try:
+            async with asyncio.TaskGroup() as group:
+                tasks = [group.create_task(self.platform.run())]
+                if self.config.mail.host:
+                    tasks.append(group.create_task(self.postman.run()))
+                life = sign_of_life(self.ros.alive, self.platform, self.boot, self.config.alive)
+                tasks.append(group.create_task(life))
+                print("READY " + json.dumps({"boot": self.boot, "bridge": self.config.bridge}), flush=True)
+                await stop.wait()
+                for task in tasks:
+                    task.cancel()
+        finally:
+            await self.office.close()
+            await self.ros.close()
+            await self.client.close()
 
 
 def main() -> int:
     """Run the link; gives the exit status."""
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s", stream=sys.stderr)
+    for name in ("roslibpy", "twisted"):  # they write a line at every attempt to connect
+        logging.getLogger(name).setLevel(logging.ERROR)
     try:
-        config = read(sys.argv[1:])
-        token = config.token_file.read_text().strip() if config.token_file else None
-        root = config.root_file.read_bytes() if config.root_file else None
-    except (OSError, ValueError) as error:
-        _log.error("cannot start: %s; check the options", error)
-        return 2
-    asyncio.run(_serve(config, token, root))
+        asyncio.run(_serve(read(sys.argv[1:])))
+    except HopError as error:
+        _log.error("%s", error)
+        return 1
     return 0
 
 
-async def _serve(config: Config, token: str | None, root: bytes | None) -> None:
+async def _serve(config: Config) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop.set)
-    client = HopClient(config.cloud, token)
-    outbox = Outbox(config.home / "outbox", lambda recipients, content: smtp.send(config.smtp, recipients, content))
-    delivery = Delivery(client, root, config.home) if root is not None else None
-    commands = Commands(config, client, delivery, outbox, Reports(config.home / "reports"))
-    ros = RosSide(config.bridge, loop)
-    jobs = Jobs(commands.table(), ros, config.jobs)
-    async with asyncio.TaskGroup() as tasks:
-        work = [
-            tasks.create_task(_live(config, ros, commands, jobs)),
-            tasks.create_task(commands.keep_sending()),
-            tasks.create_task(commands.keep_registered()),
-        ]
-        await stop.wait()
-        jobs.cancel_all()
-        for task in work:
-            task.cancel()
-    await client.close()
-    await ros.close()
+        loop.add_signal_handler(number, _begin_end, stop)
+    await Link(config).run(stop)
 
 
-async def _live(config: Config, ros: RosSide, commands: Commands, jobs: Jobs) -> None:
-    """Offer the services, then publish signs of life."""
-    await ros.connect()
-    ros.offer(commands.table(), jobs)
-    print("READY " + json.dumps({"bridge": config.bridge}), flush=True)
-    while True:
-        ros.sign_of_life(commands.cloud_present)
-        await asyncio.sleep(config.alive_period)
+def _begin_end(stop: asyncio.Event) -> None:
+    # A name server or a disk that hangs holds a thread, and Python waits for its threads: not longer than this.
+    last = threading.Timer(LAST_WORD, os._exit, (0,))
+    last.daemon = True
+    last.start()
+    stop.set()
+
+
+def _make_home(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    except OSError as error:
+        raise Refused(f"cannot use {folder}: {error.strerror}, give another --home") from None
 
 
 if __name__ == "__main__":

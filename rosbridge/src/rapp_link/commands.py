@@ -1,42 +1,61 @@
-"""What the link does for the core agent: one function per service rapp_hop/<name> (DESIGN section 3.2)."""
+"""What the core can ask of the link: one function per service rapp_hop/<name> (DESIGN §3.2)."""
 
 import asyncio
+import json
 import logging
+import re
 from collections.abc import Mapping
-from pathlib import Path
+from datetime import UTC, datetime
 from typing import Any
 
-from rapp_hop.client import HopClient
-from rapp_hop.errors import HopError
+from rapp_hop import strict_json
+from rapp_hop.errors import Invalid, Refused, Unreachable
 from rapp_hop.hz.delivery import Delivery
+from rapp_link.cloud_side import Identity, Platform
 from rapp_link.config import Config
-from rapp_link.errors import Invalid, Refused, Unreachable
-from rapp_link.jobs import Command, Progress
-from rapp_link.message import build, request
+from rapp_link.disk import Disk, replace_whole
+from rapp_link.files import read_shared, shared_file
+from rapp_link.letter import Letter
+from rapp_link.message import Attachment, Mail, build
+from rapp_link.office import Command, Ticket
 from rapp_link.outbox import Outbox
+from rapp_link.postman import Postman
 from rapp_link.reports import Reports
+from rapp_link.threads import in_thread
 
+MARGIN = 0.5  # seconds before a job's deadline at which a mail not sent yet is told as kept
+_SERVICE = re.compile(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*", re.ASCII)
+_LANGUAGE = re.compile(r"[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*", re.ASCII)
+_LIST_LIMIT = 2**20  # bytes
 _log = logging.getLogger(__name__)
-INTERPRETATION = 25.0  # s
-CALL = 120.0  # s; the caller's own time-out is the job's and ends it earlier
 
 
 class Commands:
-    """All commands, and what goes on in the background: heartbeats, kept mails, kept reports."""
+    """The services of the link."""
 
-    def __init__(self, config: Config, client: HopClient, delivery: Delivery | None, outbox: Outbox, reports: Reports) -> None:
+    def __init__(
+        self,
+        config: Config,
+        platform: Platform,
+        delivery: Delivery | None,
+        outbox: Outbox,
+        postman: Postman,
+        reports: Reports,
+    ) -> None:
+        """Take the parts.
+
+        :param delivery: None when the robot has no trusted root and so can install nothing
+        """
         self._config = config
-        self._client = client
+        self._platform = platform
         self._delivery = delivery
         self._outbox = outbox
+        self._postman = postman
         self._reports = reports
-        self._mail_lock = asyncio.Lock()
-        self._retry = asyncio.Event()
-        self._robot: dict[str, Any] | None = None
-        self.cloud_present = False
+        self._list = config.home / "link" / "rapps.json"
 
-    def table(self) -> dict[str, Command]:
-        """Command of each service."""
+    def table(self) -> Mapping[str, Command]:
+        """Return the functions by service name."""
         return {
             "register": self.register,
             "list_rapps": self.list_rapps,
@@ -48,112 +67,133 @@ class Commands:
             "report": self.report,
         }
 
-    async def register(self, arguments: Mapping[str, Any], _progress: Progress) -> Any:
-        """Register with the repository agent; heartbeats follow from then on."""
-        self._robot = dict(arguments)
-        answer = await self._client.call("register", self._robot)
-        self.cloud_present = True
-        return {"registered": True, "lease": answer["lease"]}
+    async def register(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
+        """{robot, kind, api_version} → {registered, lease}; from then on the link sends heartbeats."""
+        robot, kind, version = take(arguments, robot=str, kind=str, api_version=str)
+        return await self._platform.register(Identity(robot, kind, version), ticket.remaining)
 
-    async def list_rapps(self, _arguments: Mapping[str, Any], _progress: Progress) -> Any:
-        """The catalogue."""
-        return await self._client.call("list_rapps", {})
+    async def list_rapps(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
+        """{} → {rapps}; the last list, with "fresh": false, while the platform is away."""
+        take(arguments)
+        try:
+            answer = await self._platform.call("list_rapps", {"robot": self._platform.robot}, ticket.remaining - MARGIN)
+        except Unreachable as error:
+            known = await in_thread(self._last_list)
+            if known is None:
+                raise
+            _log.warning("%s: the last list is used", error)
+            return known | {"fresh": False}
+        if not isinstance(answer, dict) or not isinstance(answer.get("rapps"), list):
+            raise Invalid("cannot list RApps: the platform's answer is no list")
+        await in_thread(self._keep_list, answer)
+        return answer
 
-    async def interpret(self, arguments: Mapping[str, Any], _progress: Progress) -> Any:
-        """Send a recorded long command for interpretation."""
-        recording = Path(str(arguments.get("recording", ""))).resolve()
-        if not recording.is_relative_to(self._config.home):
-            raise Refused(f"cannot interpret {recording}: only the robot's own recordings leave it")
-        language = str(arguments.get("language", "en"))
-        return await self._client.call("interpret", {"language": language}, {"recording": recording}, INTERPRETATION)
+    async def interpret(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
+        """{recording, language} → {rapp | null, confidence, text, candidates}."""
+        recording, language = take(arguments, recording=str, language=str)
+        if not _LANGUAGE.fullmatch(language):
+            raise Refused(f"cannot interpret the language {language[:20]!a}: give one such as en")
+        path = await in_thread(shared_file, self._config.home, recording)
+        return await self._platform.call("interpret", {"language": language}, ticket.remaining, recording=path)
 
-    async def install(self, arguments: Mapping[str, Any], progress: Progress) -> Any:
-        """Download, verify and install a RApp."""
+    async def install(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
+        """{name} → {name, version, path, installed}; phases downloading, verified, installed."""
+        (name,) = take(arguments, name=str)
 
-        def phase(name: str, details: Mapping[str, Any]) -> None:
-            progress(name, details["bytes"] / details["of"] if details.get("of") else 1.0)
+        def on_phase(phase: str, details: dict[str, Any]) -> None:
+            whole = details.get("of", 0)
+            ticket.progress(phase, details.get("bytes", 0) / whole if whole else 1.0)
 
-        installed = await self._packages().install(_text(arguments, "name"), on_phase=phase)
-        return {
-            "name": installed.name,
-            "version": str(installed.version),
-            "path": str(installed.path),
-            "installed": bool(installed.new),
-        }
+        done = await self._store().install(name, on_phase=on_phase)
+        return {"name": done.name, "version": done.version, "path": str(done.path), "installed": done.new}
 
-    async def remove(self, arguments: Mapping[str, Any], _progress: Progress) -> Any:
-        """Remove an installed RApp."""
-        return {"removed": await self._packages().remove(_text(arguments, "name"))}
+    async def remove(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
+        """{name} → {removed}."""
+        (name,) = take(arguments, name=str)
+        return {"removed": await self._store().remove(name)}
 
-    async def call(self, arguments: Mapping[str, Any], _progress: Progress) -> Any:
-        """Call a HOP service for a dynamic agent."""
-        values = arguments.get("arguments", {})
-        if not isinstance(values, dict):
-            raise Invalid("cannot call: arguments must be an object")
-        return await self._client.call(_text(arguments, "service"), values, timeout=CALL)
+    async def call(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
+        """{service, arguments} → what the platform's service returns."""
+        service, values = take(arguments, service=str, arguments=dict)
+        if not _SERVICE.fullmatch(service):
+            raise Refused(f"cannot call {service[:60]!a}: give a service's name")
+        return await self._platform.call(service, values, ticket.remaining)
 
-    async def send_mail(self, arguments: Mapping[str, Any], _progress: Progress) -> Any:
-        """Keep the mail on disk, try to send it: "delivered", or "kept" when it goes later."""
-        mail = request(arguments, self._config.home)
-        content = await asyncio.to_thread(build, mail, self._config.smtp.sender)
-        async with self._mail_lock:
-            kept = await asyncio.to_thread(self._outbox.put, mail.message_id, mail.recipients, content)
-            if kept.state == "refused":
-                raise Refused(kept.reason)
-            try:
-                await asyncio.to_thread(self._outbox.deliver, kept)
-            except Unreachable as error:
-                _log.warning("%s; the mail is kept", error)
-                self._retry.set()
-                return {"state": "kept", "message_id": mail.message_id}
-        return {"state": "delivered", "message_id": mail.message_id}
+    async def send_mail(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
+        """{recipients, subject, body, attachment, message_id} → {state: delivered | kept, message_id}.
 
-    async def report(self, arguments: Mapping[str, Any], _progress: Progress) -> Any:
-        """Keep the report of a run on disk; it is sent in the background."""
-        run = arguments.get("run")
-        if not isinstance(run, dict):
-            raise Invalid("cannot report: run must be an object")
-        await asyncio.to_thread(self._reports.put, run)
-        self._retry.set()
-        return {"kept": True}
+        Once the mail is in the outbox it goes out, also when the job is cancelled or its caller has gone.
+        """
+        if not self._config.mail.host:
+            raise Refused("cannot send mail: the robot has no mail account, start the link with --smtp-host")
+        letter = await in_thread(self._put, arguments)
+        letter = await self._postman.deliver(letter, max(0.0, ticket.remaining - MARGIN))
+        return _told(letter)
 
-    async def keep_sending(self) -> None:
-        """Send kept mails and reports, with growing pauses while the other side is away. Ends by cancelling."""
-        pause = self._config.retry_first
-        while True:
-            async with self._mail_lock:
-                left = await asyncio.to_thread(self._outbox.deliver_all)
-            left += await self._reports.send_all(self._client)
-            pause = min(2 * pause, self._config.retry_most) if left else self._config.retry_first
-            if left:
-                await asyncio.sleep(pause)
-            else:
-                self._retry.clear()
-                await self._retry.wait()
+    async def report(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
+        """{run} → {kept}; it goes to the platform as soon as that can be reached. False: it has it already."""
+        (run,) = take(arguments, run=dict)
+        kept = await in_thread(self._reports.keep, run)
+        self._platform.hurry()
+        return {"kept": kept}
 
-    async def keep_registered(self) -> None:
-        """Heartbeats to the platform, and a new registration when it has forgotten the robot. Ends by cancelling."""
-        while True:
-            await asyncio.sleep(self._config.heartbeat_period)
-            if self._robot is None:
-                continue
-            try:
-                answer = await self._client.call("heartbeat", {})
-                if not answer["registered"]:
-                    await self._client.call("register", self._robot)
-                self.cloud_present = True
-            except HopError as error:
-                self.cloud_present = False
-                _log.warning("no heartbeat: %s", error)
-
-    def _packages(self) -> Delivery:
+    def _store(self) -> Delivery:
         if self._delivery is None:
-            raise Refused("cannot install: the link was started without --root-file, so no package can be verified")
+            raise Refused("cannot install: the robot trusts no store yet, start the link with --root-file")
         return self._delivery
 
+    def _put(self, arguments: dict[str, Any]) -> Letter:
+        names = {"recipients": list, "subject": str, "body": str, "attachment": str, "message_id": str}
+        recipients, subject, body, path, message_id = take(arguments, **names)
+        if not all(isinstance(name, str) for name in recipients):
+            raise Invalid("cannot read the recipients: give a list of addresses")
+        attachment = Attachment(*read_shared(self._config.home, path, self._config.mail.attachment)) if path else None
+        mail = Mail(tuple(recipients), subject, body, message_id, attachment)
+        now = datetime.now(UTC)
+        return self._outbox.put(build(mail, self._config.mail.sender, now), self._config.mail.sender, now.timestamp())
 
-def _text(arguments: Mapping[str, Any], name: str) -> str:
-    value = arguments.get(name)
-    if not isinstance(value, str) or not value:
-        raise Invalid(f"cannot do that: {name} is missing")
-    return value
+    def _keep_list(self, answer: dict[str, Any]) -> None:
+        try:
+            replace_whole(Disk(), self._list, json.dumps(answer).encode())
+        except OSError as error:
+            _log.warning("cannot keep the list of RApps: %s", error.strerror)
+
+    def _last_list(self) -> dict[str, Any] | None:
+        try:
+            known = strict_json.loads(self._list.read_bytes(), limit=_LIST_LIMIT)
+        except (OSError, Invalid):
+            return None
+        return known if isinstance(known, dict) else None
+
+
+def take(arguments: Mapping[str, Any], /, **names: type) -> tuple[Any, ...]:
+    """Return the named arguments in order.
+
+    :raises Invalid: one is missing, of another type, or not known
+    """
+    for name in arguments:
+        if name not in names:
+            raise Invalid(f"cannot use the argument {name[:60]!a}: give {', '.join(names) or 'none'}")
+    for name, kind in names.items():
+        if not isinstance(arguments.get(name), kind):
+            raise Invalid(f"cannot do without {name} ({kind.__name__}): give it")
+    return tuple(arguments[name] for name in names)
+
+
+def _told(letter: Letter) -> dict[str, str]:
+    if letter.refused:
+        words = "; ".join(f"{name}: {said}" for name, said in letter.refused.items())
+        others = [name for name in letter.recipients if name not in letter.refused]
+        rest = f" ({', '.join(others)}: {'kept' if letter.pending else 'delivered'})" if others else ""
+        raise Refused(f"cannot deliver to {words}{rest}")
+    return {"state": "delivered" if letter.state == "sent" else "kept", "message_id": letter.message_id}
+
+
+async def sign_of_life(publish: Any, platform: Platform, boot: str, every: float) -> None:
+    """Publish that the link lives, and whether the platform does, until cancelled.
+
+    :param every: seconds
+    """
+    while True:
+        publish({"boot": boot, "cloud": platform.reachable})
+        await asyncio.sleep(every)

@@ -1,93 +1,132 @@
-"""Settings of the link: one frozen object, from environment and options; the mail password is read where it is used."""
+"""Settings of the link: one frozen object, from environment and options."""
 
 import argparse
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-import platformdirs
+from rapp_hop.errors import Invalid, Refused
+from rapp_link.addresses import check_address
+
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+SECURITY = ("none", "starttls", "tls")
 
 
 @dataclass(frozen=True)
-class SmtpConfig:
-    """The mail account."""
+class MailConfig:
+    """The mail account that the robot sends from."""
 
-    host: str = "127.0.0.1"
-    port: int = 25
+    host: str = ""  # empty: the robot sends no mail
+    port: int = 587
     user: str = ""  # empty: no AUTH
-    password: str = ""
-    security: str = "starttls"  # none, starttls, tls
-    sender: str = ""
-    certificates: Path | None = None  # PEM file of extra certificate authorities
-    timeout: float = 20.0  # s per step of the protocol
-
-    def __repr__(self) -> str:
-        """Without the password: configurations end up in logs."""
-        return f"SmtpConfig({self.user or 'nobody'} at {self.host}:{self.port}, {self.security})"
+    password: str = field(default="", repr=False)
+    security: str = "starttls"  # none, starttls or tls
+    ca_file: Path | None = None  # PEM; none: the system's authorities
+    sender: str = ""  # address in MAIL FROM and From
+    connect_timeout: float = 10.0  # seconds, also for each answer of the server
+    transfer_timeout: float = 60.0  # seconds for one whole try
+    retry_first: float = 2.0  # seconds to the second try
+    retry_most: float = 300.0  # seconds between later tries
+    give_up: float = 5 * 86400.0  # seconds (RFC 5321 §4.5.4.1)
+    attachment: int = 25 * 2**20  # bytes
+    waiting: int = 200  # mails that may wait in the outbox
 
 
 @dataclass(frozen=True)
 class Config:
-    """Every setting of the link."""
+    """Everything the link is told."""
 
+    home: Path
     bridge: str = "ws://127.0.0.1:9090"
     cloud: str = "http://127.0.0.1:9001"
-    home: Path = Path(platformdirs.user_data_dir("rapp"))
-    token_file: Path | None = None
-    root_file: Path | None = None  # trusted root of the store (TUF), shipped with the robot
-    smtp: SmtpConfig = SmtpConfig()
-    alive_period: float = 0.25  # s between signs of life
+    token: str = field(default="", repr=False)
+    root: bytes = field(default=b"", repr=False)  # trusted root.json of the store
+    mail: MailConfig = field(default_factory=MailConfig)
     jobs: int = 32  # open at once
-    heartbeat_period: float = 10.0  # s between heartbeats to the platform
-    retry_first: float = 2.0  # s until a kept mail or report is tried again; doubles
-    retry_most: float = 300.0  # s
+    longest: float = 600.0  # seconds a job may take
+    alive: float = 0.25  # seconds between signs of life
+    heartbeat_most: float = 5.0  # seconds between heartbeats to the platform; a third of the lease when that is less
+    retry_first: float = 0.5  # seconds to the next try when the platform is away
+    retry_most: float = 15.0  # seconds
 
 
 def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
-    """Read options over environment over defaults."""
-    parser = argparse.ArgumentParser(prog="link", description="the robot's HOP program")
-    for name, variable, text in _OPTIONS:
-        parser.add_argument(f"--{name}", default=env.get(variable), help=f"{text} [{variable}]")
-    got = {name.replace("-", "_"): value for name, value in vars(parser.parse_args(words)).items()}
-    default = Config()
+    """Read options, over environment (RAPP_*), over defaults.
+
+    :raises Invalid: a setting or one of the files it names is wrong
+    """
+    options = _parser(env).parse_args(words)
+    home = Path(options.home).expanduser().absolute()
     return Config(
-        bridge=got["bridge"] or default.bridge,
-        cloud=(got["cloud"] or default.cloud).rstrip("/"),
-        home=Path(got["home"] or default.home).expanduser().resolve(),
-        token_file=_path(got["token_file"]),
-        root_file=_path(got["root_file"]),
-        smtp=SmtpConfig(
-            host=got["smtp_host"] or SmtpConfig.host,
-            port=int(got["smtp_port"] or SmtpConfig.port),
-            user=got["smtp_user"] or "",
-            password=_password(_path(got["smtp_password_file"]), env),
-            security=got["smtp_security"] or SmtpConfig.security,
-            sender=got["mail_from"] or got["smtp_user"] or "",
-            certificates=_path(got["smtp_certificates"]),
-        ),
+        home=home,
+        bridge=options.bridge,
+        cloud=options.cloud,
+        token=_text(options.token_file, "token file"),
+        root=_bytes(options.root_file, "trusted root"),
+        mail=_mail(options, env),
     )
 
 
-_OPTIONS = (
-    ("bridge", "RAPP_BRIDGE", "URL of rosbridge"),
-    ("cloud", "RAPP_CLOUD", "URL of the platform"),
-    ("home", "RAPP_HOME", "the robot's data folder"),
-    ("token-file", "RAPP_TOKEN_FILE", "file that holds this robot's token"),
-    ("root-file", "RAPP_ROOT_FILE", "trusted root of the store"),
-    ("smtp-host", "RAPP_SMTP_HOST", "mail server"),
-    ("smtp-port", "RAPP_SMTP_PORT", "its port"),
-    ("smtp-user", "RAPP_SMTP_USER", "its user; empty: no login"),
-    ("smtp-password-file", "RAPP_SMTP_PASSWORD_FILE", "file that holds the password; or RAPP_SMTP_PASSWORD"),
-    ("smtp-security", "RAPP_SMTP_SECURITY", "none, starttls or tls"),
-    ("smtp-certificates", "RAPP_SMTP_CERTIFICATES", "PEM file of certificate authorities to trust as well"),
-    ("mail-from", "RAPP_MAIL_FROM", "the sender's address"),
-)
+def _parser(env: Mapping[str, str]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="link", description="The robot's way to platform and mail server")
+    data = Path(env.get("XDG_DATA_HOME") or Path("~/.local/share").expanduser())
+
+    def option(name: str, default: object, text: str) -> None:
+        known = env.get("RAPP_" + name.upper().replace("-", "_"))
+        parser.add_argument(f"--{name}", default=known or default, help=f"{text} (RAPP_{name.upper().replace('-', '_')})")
+
+    option("bridge", Config.bridge, "rosbridge")
+    option("cloud", Config.cloud, "platform")
+    option("home", data / "rapp", "the robot's data folder")
+    option("token-file", "", "file with the robot's token for the platform")
+    option("root-file", "", "trusted root.json of the platform's store")
+    option("smtp-host", "", "mail server; none: no mails are sent")
+    option("smtp-port", MailConfig.port, "its port")
+    option("smtp-user", "", "name of the account; none: no login")
+    option("smtp-security", MailConfig.security, "none, starttls or tls")
+    option("smtp-password-file", "", "file with the password; or the variable RAPP_SMTP_PASSWORD")
+    option("smtp-ca-file", "", "certificate authority (PEM) of a mail server of your own")
+    option("mail-from", "", "sender's address; none: the account's name")
+    return parser
 
 
-def _path(value: str | None) -> Path | None:
-    return Path(value).expanduser() if value else None
+def _mail(options: argparse.Namespace, env: Mapping[str, str]) -> MailConfig:
+    if not options.smtp_host:
+        return MailConfig()
+    if options.smtp_security not in SECURITY:
+        raise Invalid(f"cannot use --smtp-security {options.smtp_security!r}: give one of {', '.join(SECURITY)}")
+    if options.smtp_user and options.smtp_security == "none" and options.smtp_host not in LOOPBACK:
+        raise Invalid("cannot log in without encryption: use --smtp-security starttls or tls")
+    try:
+        port = int(options.smtp_port)
+        sender = check_address(options.mail_from or options.smtp_user)
+    except ValueError:
+        raise Invalid(f"cannot use --smtp-port {options.smtp_port!r}: give a number") from None
+    except Refused as error:
+        raise Invalid(f"cannot send from --mail-from {options.mail_from!r}: {error}") from None
+    return MailConfig(
+        host=options.smtp_host,
+        port=port,
+        user=options.smtp_user,
+        password=_text(options.smtp_password_file, "password file") or env.get("RAPP_SMTP_PASSWORD", ""),
+        security=options.smtp_security,
+        ca_file=Path(options.smtp_ca_file) if options.smtp_ca_file else None,
+        sender=sender,
+    )
 
 
-def _password(file: Path | None, env: Mapping[str, str]) -> str:
-    return file.read_text().strip() if file is not None else env.get("RAPP_SMTP_PASSWORD", "")
+def _text(path: str, what: str) -> str:
+    try:
+        return _bytes(path, what).decode().strip()
+    except UnicodeDecodeError:
+        raise Invalid(f"cannot read the {what} {path}: it is not text") from None
+
+
+def _bytes(path: str, what: str) -> bytes:
+    if not path:
+        return b""
+    try:
+        return Path(path).expanduser().read_bytes()
+    except OSError as error:
+        raise Invalid(f"cannot read the {what} {path}: {error.strerror}, check the option") from None

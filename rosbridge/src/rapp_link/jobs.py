@@ -1,77 +1,76 @@
-"""Jobs: what the core agent has asked for and not yet got (DESIGN section 3.2). No I/O but the events it is given to tell."""
+"""The table of jobs: what the core asked for and has not got yet. Pure; times are handed in.
 
-import asyncio
-import json
-import logging
-from collections.abc import Awaitable, Callable, Mapping
-from typing import Any, Protocol
+Rules: the caller chooses the id; an id is used once; at most so many jobs are open; every job has a deadline; every job
+ends once, and whoever ends it tells the caller.
+"""
 
-from rapp_hop.errors import HopError
-from rapp_link.errors import LinkError
+import math
+import re
+from collections import deque
+from dataclasses import dataclass
 
-_log = logging.getLogger(__name__)
-Progress = Callable[[str, float], None]
-Command = Callable[[Mapping[str, Any], Progress], Awaitable[Any]]
+from rapp_hop.errors import Invalid, Refused
 
-
-class Events(Protocol):
-    """Where progress and ends are told."""
-
-    def progress(self, job: str, phase: str, fraction: float) -> None: ...  # noqa: D102
-    def done(self, job: str, result: str) -> None: ...  # noqa: D102
-    def failed(self, job: str, kind: str, message: str) -> None: ...  # noqa: D102
+_ID = re.compile(r"[A-Za-z0-9_.:/-]{1,128}", re.ASCII)
+REMEMBERED = 1000  # ids of ended jobs that are not taken again
 
 
-class Jobs:
-    """Open jobs, each a task with a deadline; every job accepted ends with just one event."""
+@dataclass(frozen=True)
+class Job:
+    """One thing asked for."""
 
-    def __init__(self, commands: Mapping[str, Command], events: Events, most: int) -> None:
-        self._commands = commands
-        self._events = events
-        self._most = most
-        self._open: dict[str, asyncio.Task[None]] = {}
+    id: str
+    service: str
+    deadline: float  # seconds of the clock that opened it
 
-    def accept(self, command: str, job: str, arguments: str, timeout: float) -> str:
-        """Start a job; gives "" when it was accepted, else why not. Runs in the event loop."""
-        if job in self._open or not job:
-            return f"cannot start job {job!r}: its id is empty or in use"
-        if len(self._open) >= self._most:
-            return f"cannot start another job: {self._most} are open already; try again later"
-        try:
-            values = json.loads(arguments)
-        except ValueError as error:
-            return f"cannot read the arguments: {error}"
-        if not isinstance(values, dict):
-            return "cannot read the arguments: they are no JSON object"
-        task = asyncio.create_task(self._run(command, job, values, timeout if timeout > 0 else None))
-        self._open[job] = task
-        task.add_done_callback(lambda _task: self._open.pop(job, None))
-        return ""
 
-    def cancel(self, job: str) -> None:
-        """End a job; nothing is told of it any more."""
-        task = self._open.get(job)
-        if task is not None:
-            task.cancel()
+class JobTable:
+    """The open jobs."""
 
-    def cancel_all(self) -> None:
-        """End all jobs."""
-        for task in list(self._open.values()):
-            task.cancel()
+    def __init__(self, capacity: int, longest: float) -> None:
+        """Begin with none.
 
-    async def _run(self, command: str, job: str, arguments: Mapping[str, Any], timeout: float | None) -> None:
-        try:
-            async with asyncio.timeout(timeout):
-                result = await self._commands[command](
-                    arguments, lambda phase, fraction: self._events.progress(job, phase, fraction)
-                )
-            self._events.done(job, json.dumps(result))
-        except (LinkError, HopError) as error:
-            self._events.failed(job, error.kind, str(error))
-        except TimeoutError:
-            self._events.failed(job, "unreachable", f"cannot {command}: not done in {timeout:g} s")
-        except asyncio.CancelledError:
-            raise
-        except Exception as error:  # noqa: BLE001 - logged here, and told to the core agent, who must not wait for ever
-            _log.exception("%s failed", command)
-            self._events.failed(job, "bug", f"cannot {command}: {type(error).__name__}: {error}")
+        :param capacity: jobs open at once
+        :param longest: seconds a job may take
+        """
+        self._capacity = capacity
+        self._longest = longest
+        self._open: dict[str, Job] = {}
+        self._ended: deque[str] = deque(maxlen=REMEMBERED)
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    def open(self, job_id: str, service: str, timeout: float, now: float) -> Job:
+        """Take a job in.
+
+        :param timeout: seconds
+        :raises Invalid: the id or the time-out cannot be used
+        :raises Refused: the id was used before, or too many jobs are open
+        """
+        if not _ID.fullmatch(job_id):
+            raise Invalid("cannot take a job without an id: give a unique one of letters, digits and _.:/-")
+        if not (math.isfinite(timeout) and timeout > 0):
+            raise Invalid(f"cannot finish in {timeout} s: give a time-out above zero")
+        if job_id in self._open or job_id in self._ended:
+            raise Refused(f"cannot take job {job_id} twice: give each request an id of its own")
+        if len(self._open) >= self._capacity:
+            raise Refused(f"cannot take more than {self._capacity} jobs at once: wait until one has ended")
+        job = Job(job_id, service, now + min(timeout, self._longest))
+        self._open[job_id] = job
+        return job
+
+    def end(self, job_id: str) -> Job | None:
+        """Close a job; None when it is not open, so that only the first of several ends is told."""
+        job = self._open.pop(job_id, None)
+        if job is not None:
+            self._ended.append(job_id)
+        return job
+
+    def due(self, now: float) -> list[Job]:
+        """Return the open jobs whose deadline has come."""
+        return [job for job in self._open.values() if job.deadline <= now]
+
+    def all(self) -> list[Job]:
+        """Return the open jobs."""
+        return list(self._open.values())

@@ -1,76 +1,95 @@
-"""Builds the mail of a request: MIME with an audio attachment. Pure but for reading the attachment."""
+"""Building the mail: MIME with one attachment, 7-bit on the wire. Pure."""
 
-from collections.abc import Mapping
+import hashlib
+import json
+import unicodedata
 from dataclasses import dataclass
-from email.headerregistry import Address
+from datetime import datetime
 from email.message import EmailMessage
 from email.policy import SMTP
-from email.utils import formatdate
-from pathlib import Path
-from typing import Any
+from email.utils import make_msgid
 
-from rapp_link.errors import Invalid, Refused
+from rapp_hop.errors import Refused
+from rapp_link.addresses import check_line, check_message_id, parse_recipient
 
-LARGEST = 24 << 20  # bytes of an attachment
-MOST = 20  # recipients
+MAX_RECIPIENTS = 20
+MAX_BODY = 64 * 2**10  # characters; across rosbridge go short texts only
+_SEVEN_BIT = SMTP.clone(cte_type="7bit")  # every server takes it, also one without 8BITMIME
+_TYPES = {"ogg": ("audio", "ogg"), "wav": ("audio", "wav"), "png": ("image", "png"), "jpg": ("image", "jpeg")}
 
 
 @dataclass(frozen=True)
-class MailRequest:
-    """What a dynamic agent wants sent."""
+class Attachment:
+    """A file that goes with a mail."""
+
+    name: str  # without folders
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Mail:
+    """What the core asks to send."""
 
     recipients: tuple[str, ...]
     subject: str
     body: str
-    attachment: Path | None
+    message_id: str = ""  # empty: the link makes one
+    attachment: Attachment | None = None
+
+    @property
+    def digest(self) -> str:
+        """Tell mails with different content apart."""
+        data = self.attachment.data if self.attachment else b""
+        name = self.attachment.name if self.attachment else None
+        words = json.dumps([self.recipients, self.subject, self.body, name, hashlib.sha256(data).hexdigest()])
+        return hashlib.sha256(words.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Built:
+    """A mail ready to be sent, the same bytes at every try."""
+
     message_id: str
+    recipients: tuple[str, ...]  # envelope addresses
+    content: bytes  # CRLF line ends
+    digest: str
 
 
-def request(arguments: Mapping[str, Any], home: Path) -> MailRequest:
-    """Check the arguments of rapp_hop/send_mail. Raises Invalid, Refused for a file outside the robot's data."""
-    recipients = arguments.get("recipients")
-    texts = [arguments.get(name) for name in ("subject", "body", "message_id")]
-    if not isinstance(recipients, list) or not 1 <= len(recipients) <= MOST or not all(isinstance(t, str) for t in texts):
-        raise Invalid(f"cannot send: 1 to {MOST} recipients, subject, body and message_id are needed")
-    subject, body, message_id = (str(text) for text in texts)
-    for header in (subject, message_id, *map(str, recipients)):
-        if any(ord(c) < 32 or ord(c) == 127 for c in header):
-            raise Invalid("cannot send: recipients, subject and message_id must be one line each")
-    for recipient in recipients:
-        _check_address(recipient)
-    return MailRequest(tuple(recipients), subject, body, _attachment(arguments.get("attachment"), home), message_id)
+def build(mail: Mail, sender: str, now: datetime) -> Built:
+    """Write the mail down.
 
-
-def _check_address(text: object) -> None:
-    try:
-        address = Address(addr_spec=str(text))
-    except (ValueError, IndexError) as error:
-        raise Invalid(f"cannot send to {text!r}: that is no mail address") from error
-    if not address.username or not address.domain:
-        raise Invalid(f"cannot send to {text!r}: that is no mail address")
-
-
-def _attachment(value: object, home: Path) -> Path | None:
-    if not value:
-        return None
-    path = Path(str(value)).resolve()
-    if not path.is_relative_to(home):
-        raise Refused(f"cannot attach {path}: only the robot's own data may leave it")
-    if not path.is_file() or path.stat().st_size > LARGEST:
-        raise Invalid(f"cannot attach {path}: a file of at most {LARGEST} bytes is needed")
-    return path
-
-
-def build(mail: MailRequest, sender: str) -> bytes:
-    """The mail as it travels (RFC 5322)."""
-    message = EmailMessage(policy=SMTP)
-    message["From"] = sender or "robot@localhost"
-    message["To"] = ", ".join(mail.recipients)
-    message["Subject"] = mail.subject
-    message["Date"] = formatdate(localtime=True)
-    message["Message-ID"] = mail.message_id
-    message.set_content(mail.body)
+    :param sender: checked address
+    :param now: for the Date header, with time zone
+    :raises Refused: a recipient, the subject, the id, the body or the file's name cannot go into a mail
+    """
+    if not 0 < len(mail.recipients) <= MAX_RECIPIENTS:
+        raise Refused(f"cannot mail to {len(mail.recipients)} recipients: give 1 to {MAX_RECIPIENTS}")
+    addresses = [parse_recipient(text) for text in mail.recipients]
+    domain = sender.rpartition("@")[2]
+    message = EmailMessage(policy=_SEVEN_BIT)
+    message["From"] = sender
+    message["To"] = addresses
+    message["Subject"] = check_line(mail.subject, "subject", 500)
+    message["Date"] = now
+    message["Message-ID"] = check_message_id(mail.message_id or make_msgid(domain=domain))
+    message.set_content(_check_body(mail.body), charset="utf-8", cte="quoted-printable")
     if mail.attachment is not None:
-        content = mail.attachment.read_bytes()
-        message.add_attachment(content, maintype="audio", subtype="ogg", filename="message.ogg")
-    return message.as_bytes()
+        _attach(message, mail.attachment)
+    envelope = tuple(dict.fromkeys(address.addr_spec for address in addresses))
+    return Built(str(message["Message-ID"]), envelope, message.as_bytes(), mail.digest)
+
+
+def _attach(message: EmailMessage, attachment: Attachment) -> None:
+    name = check_line(attachment.name, "file name", 200)
+    kind, detail = _TYPES.get(name.rpartition(".")[2].lower(), ("application", "octet-stream"))
+    message.add_attachment(attachment.data, maintype=kind, subtype=detail, filename=name)
+
+
+def _check_body(text: str) -> str:
+    if len(text) > MAX_BODY:
+        raise Refused(f"cannot send a text of {len(text)} characters: at most {MAX_BODY} are allowed, attach a file")
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if any(unicodedata.category(letter) in ("Cc", "Cs") and letter not in "\n\t" for letter in text):
+        raise Refused("cannot send a text with control characters: leave them out")
+    return text
+

@@ -1,111 +1,137 @@
-"""Mails on disk until the server has them: written before the first try, removed after acceptance, one Message-ID over all tries.
+"""The mails on the disk. Rules:
 
-A folder per mail, named by the digest of its Message-ID: `mail` holds the whole mail, `envelope.json` its recipients and, once
-the server has accepted it, the state "sent". A crash between acceptance and the note sends the mail again with the same
-Message-ID; our own server delivers that once.
+a mail is in the outbox whole or not at all (its folder is made aside, then renamed); the same bytes and one Message-ID go
+out at every try; what the server took is written down before anybody is told; the content of a finished mail goes, its
+Message-ID stays, so that asking twice sends once. A power cut between the server's "taken" and our note means one more
+try with the same Message-ID, which a server that knows it drops.
+
+Layout: <folder>/<hash of Message-ID>/{letter.json, message.eml}. Blocking; one thread at a time (a lock sees to it).
 """
 
+import errno
 import hashlib
-import json
-import os
-import shutil
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import logging
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from rapp_link.errors import Refused, Unreachable
+from rapp_hop.errors import Invalid, Refused
+from rapp_link.disk import Disk, new_aside, replace_whole, sweep
+from rapp_link.letter import Letter, from_json, to_json
+from rapp_link.message import Built
 
-Send = Callable[[Sequence[str], bytes], None]
-
-
-@dataclass(frozen=True)
-class Kept:
-    """One mail in the outbox."""
-
-    folder: Path
-    message_id: str
-    recipients: tuple[str, ...]
-    state: str  # queued, sent, refused
-    reason: str = ""
+_log = logging.getLogger(__name__)
+REMEMBERED = 1000  # finished mails whose Message-ID is known
 
 
 class Outbox:
-    """The folder of mails; used by one thread at a time."""
+    """All mails of this robot: those that wait and the ids of those that are done."""
 
-    def __init__(self, folder: Path, send: Send) -> None:
+    def __init__(self, folder: Path, waiting: int, disk: Disk | None = None) -> None:
+        """Open or make the outbox and set right what a power cut left.
+
+        :param waiting: mails that may wait at once
+        :raises Refused: the disk refuses
+        """
         self._folder = folder
-        self._send = send
-        folder.mkdir(parents=True, exist_ok=True)
-        for aside in folder.glob("*.new"):
-            shutil.rmtree(aside)
+        self._waiting = waiting
+        self._disk = disk or Disk()
+        self._lock = threading.Lock()
+        self._letters: dict[str, Letter] = {}
+        with _translated(folder):
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            self._reconcile()
 
-    def put(self, message_id: str, recipients: Sequence[str], content: bytes) -> Kept:
-        """Keep a mail on disk; the same Message-ID again gives what is known of it."""
-        name = hashlib.sha256(message_id.encode()).hexdigest()[:32]
-        final = self._folder / name
-        if final.exists():
-            return self._read(final)
-        aside = self._folder / f"{name}.new"
-        aside.mkdir()
-        _write(aside / "mail", content)
-        self._note(aside, Kept(aside, message_id, tuple(recipients), "queued"))
-        aside.rename(final)
-        _sync(self._folder)
-        return self._read(final)
+    def queued(self) -> list[Letter]:
+        """Return the mails that wait, oldest first."""
+        with self._lock:
+            waiting = [letter for letter in self._letters.values() if letter.state == "queued"]
+        return sorted(waiting, key=lambda letter: letter.queued_at)
 
-    def queued(self) -> list[Kept]:
-        """Mails that still have to be sent, oldest first."""
-        folders = sorted((f for f in self._folder.iterdir() if not f.name.endswith(".new")), key=lambda f: f.stat().st_mtime)
-        return [kept for kept in map(self._read, folders) if kept.state == "queued"]
+    def find(self, message_id: str) -> Letter | None:
+        """Return what is known of a mail."""
+        with self._lock:
+            return self._letters.get(message_id)
 
-    def deliver(self, kept: Kept) -> None:
-        """Try to send one mail. Raises Unreachable: it stays queued; Refused: it is noted as refused and not tried again."""
-        if kept.state == "sent":
-            return
+    def put(self, built: Built, sender: str, now: float) -> Letter:
+        """Keep a mail; one that is known already is not kept again, its letter tells how far it is.
+
+        :param now: seconds since 1970
+        :raises Refused: the id belongs to another mail, the outbox is full, or the disk refuses
+        """
+        with self._lock, _translated(self._folder):
+            known = self._letters.get(built.message_id)
+            if known is not None:
+                if known.digest != built.digest:
+                    raise Refused(f"cannot send two mails as {built.message_id}: give the second an id of its own")
+                return known
+            if sum(letter.state == "queued" for letter in self._letters.values()) >= self._waiting:
+                raise Refused(f"cannot keep more than {self._waiting} mails: see why the mail server takes none")
+            letter = Letter(built.message_id, sender, built.recipients, built.digest, now, built.recipients)
+            self._store(letter, built.content)
+            self._letters[letter.message_id] = letter
+            return letter
+
+    def content(self, letter: Letter) -> bytes:
+        """Return the bytes to send.
+
+        :raises Refused: the disk refuses
+        """
+        with _translated(self._folder):
+            return (self._place(letter) / "message.eml").read_bytes()
+
+    def update(self, letter: Letter) -> None:
+        """Write down how far a mail is; in memory it is known even when the disk refuses.
+
+        :raises Refused: the disk refuses
+        """
+        with self._lock, _translated(self._folder):
+            self._letters[letter.message_id] = letter
+            replace_whole(self._disk, self._place(letter) / "letter.json", to_json(letter))
+            if letter.state != "queued":
+                self._disk.remove(self._place(letter) / "message.eml")
+                self._forget_oldest()
+
+    def _store(self, letter: Letter, content: bytes) -> None:
+        aside = new_aside(self._folder)
         try:
-            self._send(kept.recipients, (kept.folder / "mail").read_bytes())
-        except Refused as error:
-            self._note(kept.folder, Kept(kept.folder, kept.message_id, kept.recipients, "refused", str(error)))
+            self._disk.make_folder(aside)
+            self._disk.write(aside / "message.eml", content)
+            self._disk.write(aside / "letter.json", to_json(letter))
+            self._disk.rename(aside, self._place(letter))
+        except OSError:
+            self._disk.remove(aside)
             raise
-        self._note(kept.folder, Kept(kept.folder, kept.message_id, kept.recipients, "sent"))
-        (kept.folder / "mail").unlink()
 
-    def deliver_all(self) -> int:
-        """Try all queued mails; gives how many are still queued."""
-        left = 0
-        for kept in self.queued():
+    def _reconcile(self) -> None:
+        sweep(self._disk, self._folder)
+        for place in sorted(path for path in self._folder.iterdir() if path.is_dir()):
+            sweep(self._disk, place)
             try:
-                self.deliver(kept)
-            except Unreachable:
-                left += 1
-            except Refused:
-                continue  # noted in its envelope
-        return left
+                letter = from_json((place / "letter.json").read_bytes())
+            except (Invalid, FileNotFoundError) as error:
+                _log.error("cannot use %s: %s, look at it and remove it", place, error)
+                continue
+            self._letters[letter.message_id] = letter
+            if letter.state != "queued":
+                self._disk.remove(place / "message.eml")
+        self._forget_oldest()
 
-    @staticmethod
-    def _read(folder: Path) -> Kept:
-        values = json.loads((folder / "envelope.json").read_text())
-        return Kept(folder, values["message_id"], tuple(values["recipients"]), values["state"], values["reason"])
+    def _forget_oldest(self) -> None:
+        done = sorted((item for item in self._letters.values() if item.state != "queued"), key=lambda item: item.queued_at)
+        for letter in done[: max(0, len(done) - REMEMBERED)]:
+            self._disk.remove(self._place(letter))
+            del self._letters[letter.message_id]
 
-    @staticmethod
-    def _note(folder: Path, kept: Kept) -> None:
-        values = {"message_id": kept.message_id, "recipients": kept.recipients, "state": kept.state, "reason": kept.reason}
-        aside = folder / "envelope.json.new"
-        _write(aside, json.dumps(values).encode())
-        aside.replace(folder / "envelope.json")
-        _sync(folder)
+    def _place(self, letter: Letter) -> Path:
+        return self._folder / hashlib.sha256(letter.message_id.encode()).hexdigest()[:40]
 
 
-def _write(path: Path, content: bytes) -> None:
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
+@contextmanager
+def _translated(folder: Path) -> Iterator[None]:
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        yield
+    except OSError as error:
+        step = "free some space" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "check the folder"
+        raise Refused(f"cannot keep mails in {folder}: {error.strerror}, {step}") from None

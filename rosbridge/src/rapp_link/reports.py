@@ -1,49 +1,91 @@
-"""Reports of runs on disk until the platform has them; each one is a file, removed after the platform has taken it."""
+"""Reports of runs on the disk until the platform has them. Blocking.
 
-import asyncio
-import json
-import os
-import secrets
+A report's name is the hash of its content: kept twice it is one file, and one that was sent is remembered, so nothing is
+sent twice. (A power cut between the platform's answer and our note sends it again; the platform knows it by its run.)
+"""
+
+import hashlib
 from pathlib import Path
 from typing import Any
 
-from rapp_hop.client import HopClient
-from rapp_hop.errors import HopError, Unreachable
+from rapp_hop import strict_json
+from rapp_hop.errors import Invalid, Refused
+from rapp_link.disk import Disk, new_aside, replace_whole, sweep
 
-MOST = 200  # kept at once; the oldest goes first
+KEPT, REMEMBERED = 500, 500  # reports waiting, and sent ones remembered
+MAX_REPORT = 256 * 2**10  # bytes
 
 
 class Reports:
-    """A folder of reports; each carries an id of its own, by which the platform knows one sent twice."""
+    """The reports of this robot."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, disk: Disk | None = None) -> None:
+        """Open or make the folder.
+
+        :raises Refused: the disk refuses
+        """
         self._folder = folder
-        folder.mkdir(parents=True, exist_ok=True)
+        self._disk = disk or Disk()
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            sweep(self._disk, folder)
+        except OSError as error:
+            raise Refused(f"cannot keep reports in {folder}: {error.strerror}, check the folder") from None
 
-    def put(self, run: dict[str, Any]) -> None:
-        """Keep one report."""
-        kept = sorted(self._folder.glob("*.json"), key=lambda f: f.stat().st_mtime)
-        for oldest in kept[: max(0, len(kept) - MOST + 1)]:
-            oldest.unlink()
-        name = secrets.token_hex(12)
-        aside = self._folder / f"{name}.new"
-        with aside.open("w") as file:
-            json.dump({"id": name, **run}, file)
-            file.flush()
-            os.fsync(file.fileno())
-        aside.replace(self._folder / f"{name}.json")
+    def keep(self, run: dict[str, Any]) -> bool:
+        """Keep a report; false when the platform has it already. Beyond `KEPT` the oldest is forgotten.
 
-    async def send_all(self, client: HopClient) -> int:
-        """Send all that are kept; gives how many are left because the platform is away."""
-        kept = sorted(self._folder.glob("*.json"), key=lambda f: f.stat().st_mtime)
-        for done, path in enumerate(kept):
-            run = json.loads(await asyncio.to_thread(path.read_text))
-            try:
-                await client.call("report", {"run": run})
-            except Unreachable:
-                return len(kept) - done
-            except HopError:
-                path.rename(path.with_suffix(".refused"))
-                continue
-            path.unlink()
-        return 0
+        :raises Refused: the disk refuses
+        """
+        text = strict_json.dumps(run).encode()
+        if len(text) > MAX_REPORT:
+            raise Refused(f"cannot keep a report of {len(text)} bytes: at most {MAX_REPORT} are allowed")
+        path = self._folder / f"{hashlib.sha256(text).hexdigest()}.json"
+        try:
+            if path.with_suffix(".sent").exists():
+                return False
+            if not path.exists():
+                replace_whole(self._disk, path, text)
+            self._trim("*.json", KEPT)
+        except OSError as error:
+            raise Refused(f"cannot keep a report in {self._folder}: {error.strerror}, free some space") from None
+        return True
+
+    def waiting(self) -> list[Path]:
+        """Return the reports to send, oldest first."""
+        return self._by_age("*.json")
+
+    def read(self, path: Path) -> dict[str, Any]:
+        """Return a report.
+
+        :raises Invalid: damaged
+        """
+        try:
+            run = strict_json.loads(path.read_bytes(), limit=MAX_REPORT)
+        except OSError as error:
+            raise Invalid(f"cannot read {path}: {error.strerror}") from None
+        if not isinstance(run, dict):
+            raise Invalid(f"cannot read {path}: it is no report")
+        return run
+
+    def done(self, path: Path) -> None:
+        """Forget a report's content and remember that it is done.
+
+        :raises Refused: the disk refuses
+        """
+        try:
+            aside = new_aside(self._folder)
+            self._disk.write(aside, b"")
+            self._disk.rename(aside, path.with_suffix(".sent"))
+            self._disk.remove(path)
+            self._trim("*.sent", REMEMBERED)
+        except OSError as error:
+            raise Refused(f"cannot note a report in {self._folder}: {error.strerror}, check the folder") from None
+
+    def _by_age(self, pattern: str) -> list[Path]:
+        return sorted(self._folder.glob(pattern), key=lambda path: path.stat().st_mtime_ns)
+
+    def _trim(self, pattern: str, most: int) -> None:
+        found = self._by_age(pattern)
+        for path in found[: max(0, len(found) - most)]:
+            self._disk.remove(path)

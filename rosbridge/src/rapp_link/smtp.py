@@ -1,64 +1,149 @@
-"""The sending half of SMTP: one mail to one account, with STARTTLS or TLS and login; errors translated once."""
+"""One try to hand a mail to the server (RFC 5321, 3207, 4954): smtplib in a thread, bounded, errors translated once.
+
+Encryption asked for is never given up: no STARTTLS offered or a certificate that does not fit means no mail now.
+"""
 
 import smtplib
+import socket
 import ssl
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from typing import Protocol
 
-from rapp_link.config import SmtpConfig
-from rapp_link.errors import Invalid, Refused, Unreachable
+from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
+from rapp_link.config import MailConfig
+from rapp_link.letter import Outcome
+from rapp_link.threads import in_thread
 
 
-def send(account: SmtpConfig, recipients: Sequence[str], content: bytes) -> None:
-    """Send one mail; returns once the server has accepted it.
+class Sender(Protocol):
+    """Hands a mail over."""
 
-    Raises Refused when the server does not want it (5xx, login, certificate), Unreachable when it is worth trying again.
-    """
+    async def send(self, sender: str, recipients: Sequence[str], content: bytes) -> Outcome:
+        """Try once.
+
+        :raises Refused: the server refuses the mail or the account for good; the text has its words
+        :raises Unreachable: not now
+        :raises Invalid: the server's encryption or answers cannot be trusted; not now either
+        """
+
+
+class SmtpSender:
+    """Hands mails to one server with one account."""
+
+    def __init__(self, config: MailConfig) -> None:
+        self._config = config
+
+    async def send(self, sender: str, recipients: Sequence[str], content: bytes) -> Outcome:
+        """Try once; see `Sender`."""
+        return await in_thread(self._send, sender, recipients, content)
+
+    def _send(self, sender: str, recipients: Sequence[str], content: bytes) -> Outcome:
+        with _translated(self._config), self._session() as server:
+            try:
+                refused = server.sendmail(sender, list(recipients), content)
+            except smtplib.SMTPRecipientsRefused as error:
+                refused = error.recipients
+        return _outcome(recipients, refused)
+
+    @contextmanager
+    def _session(self) -> Iterator[smtplib.SMTP]:
+        config = self._config
+        context = _context(config) if config.security != "none" else None
+        server = _Tls(context, config.connect_timeout) if config.security == "tls" else _Plain(timeout=config.connect_timeout)
+        limit = threading.Timer(config.transfer_timeout, _cut, (server,))
+        limit.daemon = True
+        limit.start()
+        try:
+            code, words = server.connect(config.host, config.port)
+            if code != 220:
+                raise smtplib.SMTPConnectError(code, words)
+            if config.security == "starttls":
+                server.ehlo()
+                if not server.has_extn("starttls"):
+                    raise Invalid(f"cannot send by {config.host}: it offers no STARTTLS, use its TLS port or another server")
+                server.starttls(context=context)
+            if config.user:
+                server.login(config.user, config.password)
+            yield server
+            # The mail is taken: what goes wrong in the farewell changes nothing.
+            with suppress(OSError, smtplib.SMTPException):
+                server.quit()
+        finally:
+            limit.cancel()
+            server.close()
+
+
+class _Plain(smtplib.SMTP):
+    """Knows the host it will talk to: `starttls` checks the certificate against it."""
+
+    def __init__(self, timeout: float) -> None:
+        super().__init__(local_hostname=socket.gethostname(), timeout=timeout)
+
+    def connect(self, host: str = "localhost", port: int = 0, source_address: object = None) -> tuple[int, bytes]:
+        self._host = host
+        return super().connect(host, port)
+
+
+class _Tls(smtplib.SMTP_SSL):
+    """The same with TLS from the first byte."""
+
+    def __init__(self, context: ssl.SSLContext | None, timeout: float) -> None:
+        super().__init__(local_hostname=socket.gethostname(), timeout=timeout, context=context)
+
+    def connect(self, host: str = "localhost", port: int = 0, source_address: object = None) -> tuple[int, bytes]:
+        self._host = host
+        return super().connect(host, port)
+
+
+def _context(config: MailConfig) -> ssl.SSLContext:
     try:
-        with _connect(account) as server:
-            if account.security == "starttls":
-                server.starttls(context=_tls(account))
-            if account.user:
-                server.login(account.user, account.password)
-            refused = server.sendmail(account.sender, list(recipients), content)
+        return ssl.create_default_context(cafile=str(config.ca_file) if config.ca_file else None)
+    except OSError as error:
+        raise Invalid(f"cannot read the certificate authority {config.ca_file}: {error}") from None
+
+
+def _cut(server: smtplib.SMTP) -> None:
+    """End a transfer that trickles: smtplib bounds each read, not the whole."""
+    if server.sock is not None:
+        with suppress(OSError):
+            server.sock.shutdown(socket.SHUT_RDWR)
+
+
+def _outcome(recipients: Sequence[str], refused: Mapping[str, tuple[int, bytes]]) -> Outcome:
+    words = {name: _words(code, text) for name, (code, text) in refused.items()}
+    good = {name: text for name, text in words.items() if refused[name][0] >= 500}
+    later = {name: text for name, text in words.items() if name not in good}
+    return Outcome(tuple(name for name in recipients if name not in words), good, later)
+
+
+def _words(code: int, text: bytes | str) -> str:
+    said = text.decode("utf-8", "replace") if isinstance(text, bytes) else text
+    return f"{code} " + " ".join("".join(c if c.isprintable() else " " for c in said).split())[:200]
+
+
+@contextmanager
+def _translated(config: MailConfig) -> Iterator[None]:
+    where = f"{config.host}:{config.port}"
+    try:
+        yield
+    except HopError:
+        raise
     except smtplib.SMTPAuthenticationError as error:
-        raise Refused(f"cannot log in at {account.host} as {account.user}: {_words(error)}; check user and password") from error
-    except smtplib.SMTPRecipientsRefused as error:
-        code, words = next(iter(error.recipients.values()))
-        _raise(code, f"cannot send: {account.host} refused the recipient: {words.decode(errors='replace')}", error)
+        raise _said(where, "log in at", error.smtp_code, error.smtp_error) from None
     except smtplib.SMTPResponseException as error:
-        _raise(error.smtp_code, f"cannot send: {account.host} answered {_words(error)}", error)
+        raise _said(where, "send by", error.smtp_code, error.smtp_error) from None
     except smtplib.SMTPNotSupportedError as error:
-        raise Refused(f"cannot send by {account.host}: {error}; choose another --smtp-security") from error
-    except ssl.SSLError as error:
-        raise Refused(f"cannot trust {account.host}: {error}; check the host's name and certificate") from error
-    except (smtplib.SMTPException, OSError) as error:
-        raise Unreachable(f"cannot reach the mail server {account.host}:{account.port}: {error}") from error
-    if refused:
-        raise Refused(f"cannot send to {', '.join(refused)}: {account.host} refused them; the others were sent to")
+        raise Refused(f"cannot send by {where}: {error}") from None
+    except smtplib.SMTPServerDisconnected:
+        raise Unreachable(f"cannot send by {where}: the connection was cut, it is tried again") from None
+    except ssl.SSLCertVerificationError as error:
+        raise Invalid(f"cannot trust {where}: {error.verify_message}, check the server's name or give its authority") from None
+    except (OSError, smtplib.SMTPException) as error:
+        raise Unreachable(f"cannot reach the mail server {where}: {error}, it is tried again") from None
 
 
-def _connect(account: SmtpConfig) -> smtplib.SMTP:
-    if account.security == "tls":
-        return smtplib.SMTP_SSL(account.host, account.port, timeout=account.timeout, context=_tls(account))
-    if account.security not in ("starttls", "none"):
-        raise Invalid(f"cannot send: --smtp-security {account.security} is not none, starttls or tls")
-    if account.security == "none" and account.user:
-        raise Invalid("cannot send: a password is never sent without encryption; use --smtp-security starttls or tls")
-    return smtplib.SMTP(account.host, account.port, timeout=account.timeout)
-
-
-def _tls(account: SmtpConfig) -> ssl.SSLContext:
-    context = ssl.create_default_context()
-    if account.certificates is not None:
-        context.load_verify_locations(account.certificates)
-    return context
-
-
-def _words(error: smtplib.SMTPResponseException) -> str:
-    words = error.smtp_error
-    return f"{error.smtp_code} {words.decode(errors='replace') if isinstance(words, bytes) else words}"
-
-
-def _raise(code: int, text: str, error: Exception) -> None:
-    kind = Refused if code >= 500 else Unreachable
-    raise kind(text) from error
+def _said(where: str, what: str, code: int, text: bytes | str) -> HopError:
+    leaf = Refused if code >= 500 else Unreachable
+    return leaf(f"cannot {what} {where}: the server says {_words(code, text)}")

@@ -1,0 +1,40 @@
+"""What the core is told of a job: rapp_msgs/HopEvent as a value. Pure."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from rapp_hop.errors import HopError
+
+PROGRESS, DONE, FAILED = 0, 1, 2  # rapp_msgs/HopEvent
+
+
+@dataclass(frozen=True)
+class Event:
+    """Progress or end of one job."""
+
+    job: str
+    kind: int
+    phase: str = ""
+    fraction: float = 0.0  # 0..1 of the phase
+    error: str = ""
+    message: str = ""
+    result: str = ""  # JSON
+
+    def fields(self) -> dict[str, Any]:
+        """Return the fields of the ROS message."""
+        return dict(vars(self))
+
+
+def progress(job: str, phase: str, fraction: float) -> Event:
+    """Tell how far a job is."""
+    return Event(job, PROGRESS, phase=phase, fraction=min(1.0, max(0.0, fraction)))
+
+
+def done(job: str, result: str) -> Event:
+    """Tell a result (JSON)."""
+    return Event(job, DONE, result=result)
+
+
+def failed(job: str, error: HopError) -> Event:
+    """Tell why there is none."""
+    return Event(job, FAILED, error=error.kind, message=str(error))
