@@ -14,6 +14,7 @@ from typing import Any
 from urllib.parse import quote, urlsplit
 
 from tornado.httpclient import HTTPClientError, HTTPRequest, HTTPResponse
+from tornado.iostream import UnsatisfiableReadError
 from tornado.simple_httpclient import HTTPStreamClosedError, HTTPTimeoutError, SimpleAsyncHTTPClient
 
 from rapp_hop import strict_json
@@ -143,6 +144,8 @@ class HopClient:
             raise Unreachable(f"cannot read the answer of {where}: the connection was cut, try again") from None
         except (OSError, HTTPClientError) as error:
             raise Unreachable(f"cannot reach {where}: {error}, try again later") from None
+        except UnsatisfiableReadError:
+            raise Invalid(f"cannot read the answer of {where}: its headers have no end") from None
         except ValueError as error:
             raise Invalid(f"cannot call {where}: {error}") from None
 

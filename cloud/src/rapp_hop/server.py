@@ -172,11 +172,14 @@ class HopHandler(JsonErrors):
             return
         self._body += chunk
         if len(self._body) > self._service.max_body:
+            self._body.clear()
             self._hang_up()
-            raise self._too_large()
+            self.send(JSON_FORM.write_error(self._too_large()))
 
     async def post(self, name: str) -> None:
         """Read, check, run, answer."""
+        if self._finished:  # the body was too large
+            return
         self._server.busy += 1
         try:
             call = self._form.read(self._wire(bytes(self._body)), self._service.name)
