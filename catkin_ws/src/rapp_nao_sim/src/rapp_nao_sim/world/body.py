@@ -31,8 +31,9 @@ class Body:
         links = {info[12].decode(): int(info[0]) for info in infos}
         self._solid = [links.get(name, -1) for name in SHAPES]
         self._feet = [links["LAnkle"], links["RAnkle"]]
-        for foot in self._feet:
-            bullet.changeDynamics(self._robot, foot, lateralFriction=0.9)
+        for link in self._solid:
+            # Anchored, or the robot creeps round by a degree every few seconds.
+            bullet.changeDynamics(self._robot, link, lateralFriction=0.9, frictionAnchor=1)
 
     def angles(self) -> dict[str, float]:
         """What the joints' sensors read."""

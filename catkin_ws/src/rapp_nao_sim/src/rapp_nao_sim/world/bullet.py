@@ -1,23 +1,39 @@
-"""Opens pybullet without its banner on our standard output."""
+"""Opens pybullet without its banner on our output."""
 
 import ctypes
+import importlib
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 
 def connect() -> Any:
-    """pybullet connected to a world of its own, without graphics: the module bound to that world; end it with `disconnect()`."""
-    sys.stdout.flush()
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    try:
+    """pybullet bound to a new world of its own, without graphics; end it with `disconnect()`."""
+    with _silence(1), _silence(2):
         import pybullet
-        from pybullet_utils import bullet_client
 
-        return bullet_client.BulletClient(pybullet.DIRECT)
+        client = importlib.import_module("pybullet_utils.bullet_client")  # without type information
+        return client.BulletClient(pybullet.DIRECT)
+
+
+@contextmanager
+def _silence(descriptor: int) -> Iterator[None]:
+    """Nothing comes out of a descriptor meanwhile, from C neither."""
+    _flush()
+    kept, nowhere = os.dup(descriptor), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, descriptor)
+    try:
+        yield
     finally:
-        ctypes.CDLL(None).fflush(None)  # the banner waits in C's own buffer
-        os.dup2(kept, 1)
+        _flush()
+        os.dup2(kept, descriptor)
         os.close(kept)
         os.close(nowhere)
+
+
+def _flush() -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    ctypes.CDLL(None).fflush(None)  # C has buffers of its own

@@ -1,7 +1,7 @@
 """The NAO H25 V5 in tables: joints, links, masses, collision shapes; lengths in m, angles in rad, masses in kg, torques in Nm.
 
-Figures of the joints, masses and inertias: the URDF naoV50 of ros-naoqi/nao_robot (BSD). The right side mirrors the left at y = 0.
-The fingers are one link per hand, with a part of the hand's mass, turning by the hand's opening (0 closed, 1 open).
+Figures of the joints, masses and inertias: the URDF naoV50 of ros-naoqi/nao_robot (BSD). The right side mirrors the left at
+y = 0. The fingers are one link per hand, with a part of the hand's mass, turning by the hand's opening (0 closed, 1 open).
 """
 
 import math

@@ -15,7 +15,9 @@ from rapp_nao_sim.world.moves import Track, clip, direct, ease, posture_time, th
 from rapp_nao_sim.world.postures import LEAN_TOLERANCE, Posture, family, recognise
 
 _SETTLE = 0.3  # s of physics after a change, before it is judged
+_CALM = 0.8  # speed of waking up and resting
 _SLIP = 0.01  # rad that a limp joint gives before its gears slip
+Ways = Sequence[Sequence[float]]  # for each joint, its values one after another
 _Answer = Callable[[int, bool], None]
 
 
@@ -75,15 +77,15 @@ class Motion:
         """Send joints to angles at a fraction (0 to 1) of their greatest speed."""
         if not 0 < fraction <= 1:
             raise Refused(f"cannot move at {fraction:g} of the greatest speed; give more than 0 and at most 1")
+        _check(names, angles)
         for name, angle in zip(names, angles, strict=True):
-            self._joint(name)
             for joint in (name, *_twin(name)):
                 self._replace(joint, direct(joint, self._now, self.targets[joint], clip(joint, angle), fraction))
 
-    def move_joints(self, number: int, names: Sequence[str], goals: Sequence[Sequence[float]], times: Sequence[Sequence[float]]) -> None:
+    def move_joints(self, number: int, names: Sequence[str], goals: Ways, times: Ways) -> None:
         """Send joints through angles at times (s from now, rising); answers at the end, false when something stopped them."""
+        _check(names, goals, times)
         for name, way, when in zip(names, goals, times, strict=True):
-            self._joint(name)
             if not way or len(way) != len(when) or any(b <= a for a, b in zip((0.0, *when), when, strict=False)):
                 raise Refused(f"cannot move {name}: it needs as many rising times above 0 as angles")
         joints: set[str] = set()
@@ -113,14 +115,14 @@ class Motion:
         asleep = not self.awake()
         self.set_stiffness(BODY, [1.0] * len(BODY))
         if asleep and self.posture()[1] == "Standing":
-            self.set_posture(number, "StandInit", 0.5)
+            self.set_posture(number, "StandInit", _CALM)
         else:
             self._answer(number, True)
 
     def rest(self, number: int) -> None:
         """Go to a resting posture (crouched, or as it sits or lies) and remove the stiffness."""
         if self.awake() and self.posture()[1] == "Standing":
-            self.set_posture(number, "Crouch", 0.5, release=True)
+            self.set_posture(number, "Crouch", _CALM, release=True)
         else:
             self.stop()
             self.set_stiffness(BODY, [0.0] * len(BODY))
@@ -128,9 +130,9 @@ class Motion:
 
     def set_stiffness(self, names: Sequence[str], values: Sequence[float]) -> None:
         """Share of the motors' torque, 0 to 1."""
+        _check(names, values)
         actual = self._body.angles()
         for name, value in zip(names, values, strict=True):
-            self._joint(name)
             for joint in (name, *_twin(name)):
                 if self.stiffness[joint] == 0:  # it may have sunk: it stiffens where it is
                     self.targets[joint] = actual[joint]
@@ -220,15 +222,21 @@ class Motion:
             raise Refused(f"cannot take posture {name!r}: known are {', '.join(self._postures)}")
         return self._postures[name]
 
-    def _joint(self, name: str) -> None:
-        if name not in JOINTS:
-            raise Refused(f"cannot find joint {name!r}: known are {', '.join(BODY)}")
-
     def _upright(self, theta: float, pitch: float) -> Quaternion:
         bullet = self._bullet
         turn, lean = bullet.getQuaternionFromEuler((0, 0, theta)), bullet.getQuaternionFromEuler((0, pitch, 0))
         orientation: Quaternion = bullet.multiplyTransforms((0, 0, 0), turn, (0, 0, 0), lean)[1]
         return orientation
+
+
+def _check(names: Sequence[str], *values: Sequence[object]) -> None:
+    """Refuse before anything moves."""
+    for name in names:
+        if name not in JOINTS:
+            raise Refused(f"cannot find joint {name!r}: known are {', '.join(BODY)}")
+    for row in values:
+        if len(row) != len(names):
+            raise Refused(f"cannot use {len(row)} values for {len(names)} joints: give one for each")
 
 
 def _twin(name: str) -> tuple[str, ...]:

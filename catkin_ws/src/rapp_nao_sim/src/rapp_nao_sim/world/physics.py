@@ -24,7 +24,7 @@ STEPS = 3  # per tick
 TICK = STEP * STEPS
 LATEST = 0.25  # s behind the clock, after which lost time is given up
 FALLEN = 0.8  # rad the torso leans more than in any posture on feet or seat
-LIMIT = 60.0  # s, of a push; N/s bounds are the caller's business
+LONGEST_PUSH = 60.0  # s
 
 _log = logging.getLogger(__name__)
 
@@ -38,7 +38,8 @@ class Physics:
         self._pushes: list[tuple[tuple[float, float, float], float]] = []
         service.offer({"set_up": self._set_up})
 
-    def _set_up(self, file: Path | None, posture: str | None) -> room.Room:
+    def _set_up(self, file: Path | None, posture: str | None, pace: float) -> room.Room:
+        self._period = TICK / pace
         plan = room.load(file or room.FILE)
         known = postures.load()
         start = plan.robot
@@ -97,7 +98,7 @@ class Physics:
         due = time.monotonic()
         while True:
             self._tick()
-            due += TICK
+            due += self._period
             late = time.monotonic() - due
             if late > LATEST:
                 _log.warning("the physics is %.2f s late: that time is given up", late)
@@ -123,8 +124,8 @@ class Physics:
 
     def _push(self, force: Sequence[float], seconds: float) -> None:
         x, y, z = (float(part) for part in force)
-        if not all(map(math.isfinite, (x, y, z))) or not 0 < seconds <= LIMIT:
-            raise Refused(f"cannot push: give finite newtons and more than 0, at most {LIMIT:g} s")
+        if not all(map(math.isfinite, (x, y, z))) or not 0 < seconds <= LONGEST_PUSH:
+            raise Refused(f"cannot push: give finite newtons and more than 0, at most {LONGEST_PUSH:g} s")
         self._pushes.append(((x, y, z), seconds))
 
     def _set_door(self, angle: float) -> None:

@@ -57,7 +57,11 @@ def _face() -> Image:
     hair = _inside(u, v, -0.12, 0.64, 0.82) * (v < -0.38 + 0.25 * u * u)
     skin = np.clip(light, 0, 1)[..., None] * np.array([0.659, 0.813, 0.988])
     image = np.full((_SIDE, _SIDE, 3), (0.55, 0.50, 0.42))
-    for share, colour in ((_inside(u, v, 1.05, 0.75, 0.4), (0.35, 0.20, 0.15)), (hair, (0.10, 0.12, 0.16)), (head * (1 - hair), skin)):
+    for share, colour in (
+        (_inside(u, v, 1.05, 0.75, 0.4), (0.35, 0.20, 0.15)),
+        (hair, (0.10, 0.12, 0.16)),
+        (head * (1 - hair), skin),
+    ):
         image += share[..., None] * (np.asarray(colour) - image)
     return _bytes(_framed(image, 18, (0.18, 0.24, 0.30)))
 
@@ -88,7 +92,9 @@ def _planks() -> Image:
         cut = random.random()
         for half in range(2):
             board = ((x - cut - half / 2) % 1.0) < 0.5
-            grain = sum(np.sin(2 * np.pi * (k * x + random.random())) * random.normal(0, 0.006) for k in range(1, 9))
+            grain = np.zeros(_SIDE)
+            for wave in range(1, 9):
+                grain += np.sin(2 * np.pi * (wave * x + random.random())) * random.normal(0, 0.006)
             across = np.cumsum(random.normal(0, 0.008, tall))
             across -= np.linspace(0, across[-1], tall)
             tone = 1 + random.normal(0, 0.045) + grain[None, :] + across[:, None]
@@ -107,4 +113,5 @@ def _framed(image: npt.NDArray[Any], width: int, colour: tuple[float, float, flo
 
 
 def _bytes(image: npt.NDArray[Any]) -> Image:
-    return np.clip(image * 255, 0, 255).astype(np.uint8)
+    result: Image = np.clip(image * 255, 0, 255).astype(np.uint8)
+    return result

@@ -55,7 +55,9 @@ def recognise(postures: Mapping[str, Posture], angles: Mapping[str, float], pitc
     for posture in postures.values():
         if max(abs(pitch - posture.pitch), abs(roll)) > LEAN_TOLERANCE:
             continue
-        wrong = max(abs(angles[joint] - posture.angles[joint]) for joint in BODY if not joint.startswith("Head") and "Hand" not in joint)
+        wrong = max(
+            abs(angles[joint] - posture.angles[joint]) for joint in BODY if not joint.startswith("Head") and "Hand" not in joint
+        )
         if wrong < best:
             best, name = wrong, posture.name
     return name

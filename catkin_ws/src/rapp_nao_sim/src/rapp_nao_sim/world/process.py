@@ -23,6 +23,7 @@ class WorldConfig:
 
     room: Path | None = None  # room file; None: our own
     posture: str | None = None  # at the start; None: the room file's
+    pace: float = 1.0  # simulated seconds per second; the physics can do about 10
     start_timeout: float = 30.0  # s, until the robot stands in its room
     width: int = 960  # pixels of photographs
     height: int = 720
@@ -46,7 +47,7 @@ class WorldClient:
         config = self._config
         self._physics.start()
         try:
-            self._room = self._physics.call("set_up", config.room, config.posture, timeout=config.start_timeout)
+            self._room = self._physics.call("set_up", config.room, config.posture, config.pace, timeout=config.start_timeout)
         except BaseException:
             self.close()
             raise
@@ -157,13 +158,21 @@ class WorldClient:
         """Write a picture of the room as a PNG file; the physics goes on meanwhile."""
         state = self._physics.call("snapshot")
         with self._drawing:
-            if not self._renderer.alive():
+            try:
+                png = self._draw(state)
+            except Unreachable:
                 self._renderer.close()
-                self._renderer.start()
-                self._renderer.call("set_up", self._room, timeout=RENDER_TIMEOUT)
-            config = self._config
-            png = self._renderer.call("overview", state, config.width, config.height, timeout=RENDER_TIMEOUT)
+                png = self._draw(state)  # by a new process, once
         _write(Path(path), png)
+
+    def _draw(self, state: dict[str, Any]) -> bytes:
+        if not self._renderer.alive():
+            self._renderer.close()
+            self._renderer.start()
+            self._renderer.call("set_up", self._room, timeout=RENDER_TIMEOUT)
+        config = self._config
+        png: bytes = self._renderer.call("overview", state, config.width, config.height, timeout=RENDER_TIMEOUT)
+        return png
 
     def _tuple(self, verb: str) -> tuple[float, float, float]:
         x, y, turn = self._physics.call(verb)
@@ -189,6 +198,3 @@ def _write(path: Path, data: bytes) -> None:
         with contextlib.suppress(OSError):
             Path(aside).unlink()
         raise Refused(f"cannot write {path}: {error.strerror}; name another file") from error
-
-
-__all__ = ["Unreachable", "WorldClient", "WorldConfig"]

@@ -61,8 +61,8 @@ class Renderer:
             flags=bullet.ER_NO_SEGMENTATION_MASK,
         )
         image = np.reshape(np.asarray(pixels, np.uint8), (height * FINER, width * FINER, 4))[:, :, 2::-1]
-        image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-        _, png = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+        _, png = cv2.imencode(".png", small, [cv2.IMWRITE_PNG_COMPRESSION, 9])
         return png.tobytes()
 
 

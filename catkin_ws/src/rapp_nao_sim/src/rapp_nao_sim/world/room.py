@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -194,16 +195,31 @@ def _number(value: Any, where: str) -> float:
     return float(value)
 
 
+def _lengths(room: Room) -> Iterator[tuple[str, float]]:
+    """Every length that must be greater than 0, and what it is of."""
+    for length in (*room.floor.size, room.floor.tile):
+        yield "[floor]", length
+    for length in (room.door.width, room.door.height, room.door.thickness):
+        yield "[door]", length
+    for number, wall in enumerate(room.walls, 1):
+        for length in (wall.height, wall.thickness, math.dist(wall.start, wall.end)):
+            yield f"[[walls]] number {number}", length
+    yield from _lengths_of_things(room)
+
+
+def _lengths_of_things(room: Room) -> Iterator[tuple[str, float]]:
+    for item in room.cylinders:
+        yield repr(item.name), min(item.radius, item.height)
+    for box in room.boxes:
+        yield repr(box.name), min(box.size)
+    for picture in room.pictures:
+        yield repr(picture.name), min(picture.size)
+
+
 def _check(room: Room) -> None:
-    lengths = [("size of [floor]", part) for part in (*room.floor.size, room.floor.tile)]
-    lengths += [("size of [door]", part) for part in (room.door.width, room.door.height, room.door.thickness)]
-    lengths += [(f"size of the box {box.name!r}", part) for box in room.boxes for part in box.size]
-    lengths += [(f"size of {item.name!r}", part) for item in room.cylinders for part in (item.radius, item.height)]
-    lengths += [(f"size of the picture {picture.name!r}", part) for picture in room.pictures for part in picture.size]
-    lengths += [("size of a wall", part) for wall in room.walls for part in (wall.height, wall.thickness, math.dist(wall.start, wall.end))]
-    for where, length in lengths:
+    for where, length in _lengths(room):
         if length <= 0:
-            raise Invalid(f"cannot use the room: {where} must be greater than 0, not {length:g}")
+            raise Invalid(f"cannot use the room: a size of {where} must be greater than 0, not {length:g}")
     for kind in [room.floor.picture, *(picture.kind for picture in room.pictures)]:
         if kind not in PICTURES:
             raise Invalid(f"cannot use the room: unknown picture {kind!r}; known are {', '.join(PICTURES)}")

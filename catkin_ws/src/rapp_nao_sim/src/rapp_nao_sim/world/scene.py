@@ -45,7 +45,9 @@ class Scene:
         x, y = (door.hinge[i] + along[i] * door.width / 2 for i in (0, 1))
         self._put(self._leaf, (x, y, door.height / 2), yaw)
         for knob, side in zip(self._knobs, (-1, 1), strict=True):
-            x, y = (door.hinge[i] + along[i] * door.width * 0.9 + side * across[i] * (door.thickness / 2 + 0.02) for i in (0, 1))
+            x, y = (
+                door.hinge[i] + along[i] * door.width * 0.9 + side * across[i] * (door.thickness / 2 + 0.02) for i in (0, 1)
+            )
             self._put(knob, (x, y, door.height * 0.48), yaw)
 
     def set_lamp(self, level: float) -> None:
@@ -120,7 +122,12 @@ class Scene:
         bullet = self._bullet
         normal = (0, 0, 1) if centre == (0, 0, 0) else (1, 0, 0)
         visual = bullet.createVisualShape(
-            bullet.GEOM_MESH, vertices=corners, indices=[0, 1, 2, 0, 2, 3], uvs=repeats, normals=[normal] * 4, rgbaColor=(1, 1, 1, 1)
+            bullet.GEOM_MESH,
+            vertices=corners,
+            indices=[0, 1, 2, 0, 2, 3],
+            uvs=repeats,
+            normals=[normal] * 4,
+            rgbaColor=(1, 1, 1, 1),
         )
         body = bullet.createMultiBody(0, -1, visual, centre, self._turned(yaw))
         with tempfile.TemporaryDirectory(prefix="rapp-picture-") as folder:

@@ -40,6 +40,7 @@ class Worker:
         self._reader: threading.Thread | None = None
         self._waiting: dict[int, Future[Any]] = {}
         self._next = 0
+        self._open = False  # until the child closes the line, which it may do a moment before it can be waited for
 
     def start(self) -> None:
         """Start the process; it serves once it answers its first call. Raises Unreachable."""
@@ -54,6 +55,7 @@ class Worker:
                 ours.close()
                 raise Unreachable(f"cannot start {self._module}: {error}") from error
         self._line = Connection(ours.detach())
+        self._open = True
         self._reader = threading.Thread(target=self._read, args=(self._line,), name=self._module, daemon=True)
         self._reader.start()
 
@@ -76,13 +78,14 @@ class Worker:
             process.wait()
         if self._reader is not None:
             self._reader.join()
-        line.close()
-        self._process = self._line = None
+        with self._lock:
+            line.close()
+            self._process = self._line = None
 
     def alive(self) -> bool:
         """Whether the process runs."""
         process = self._process
-        return process is not None and process.poll() is None
+        return self._open and process is not None and process.poll() is None
 
     @property
     def pid(self) -> int | None:
@@ -108,6 +111,8 @@ class Worker:
                 self._line.send((self._next, verb, args))
             except OSError as error:
                 del self._waiting[self._next]
+                if self._process is not None:
+                    self._process.kill()  # half a request may be on the line: nothing after it can be understood
                 raise Unreachable(f"cannot {verb}: the world's process does not listen; start the simulator again") from error
         return future
 
@@ -124,6 +129,7 @@ class Worker:
             else:
                 future.set_result(answer)
         with self._lock:
+            self._open = False
             left, self._waiting = list(self._waiting.values()), {}
         for future in left:
             future.set_exception(Unreachable("cannot go on: the world's process has ended; start the simulator again"))

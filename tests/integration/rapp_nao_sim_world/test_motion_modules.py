@@ -1,0 +1,131 @@
+"""ALMotion and ALRobotPosture, called over the qi protocol as a client of the robot does."""
+
+import os
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+os.environ.setdefault("QI_LOG_LEVEL", "1")  # libqi logs on standard output otherwise
+
+import qi
+
+from rapp_nao_sim.world.model import BODY
+from rapp_nao_sim.world.motion_modules import modules
+from rapp_nao_sim.world.process import WorldClient
+
+TIMEOUT = 20_000  # ms
+
+
+@pytest.fixture(scope="module")
+def session(standing: WorldClient) -> Iterator[Any]:
+    host, client = qi.Session(), qi.Session()
+    host.listenStandalone("tcp://127.0.0.1:0")
+    for name, module in modules(standing).items():
+        host.registerService(name, module)
+    client.connect(host.url())
+    yield client
+    client.close()
+    host.close()
+
+
+@pytest.fixture
+def motion(session: Any, world: WorldClient) -> Any:
+    return session.service("ALMotion")
+
+
+@pytest.fixture
+def posture(session: Any, world: WorldClient) -> Any:
+    return session.service("ALRobotPosture")
+
+
+def test_the_body_is_described(motion: Any) -> None:
+    assert motion.getBodyNames("Body") == BODY
+    assert motion.getBodyNames("Head") == ["HeadYaw", "HeadPitch"]
+    assert motion.getLimits("HeadYaw")[0][:2] == pytest.approx([-2.0857, 2.0857], abs=1e-3)
+    assert len(motion.getLimits("Body")) == 26
+
+
+def test_postures_by_name(posture: Any) -> None:
+    assert posture.goToPosture("Sit", 1.0) is True
+    assert (posture.getPosture(), posture.getPostureFamily()) == ("Sit", "Sitting")
+    assert posture.goToPosture("Stand", 1.0) is True
+    assert posture.getPosture() == "Stand"
+    assert {"Stand", "Sit", "Crouch"} <= set(posture.getPostureList())
+    assert "Standing" in posture.getPostureFamilyList()
+    with pytest.raises(RuntimeError, match=r"ALRobotPosture::goToPosture\n\tcannot take posture 'Handstand'"):
+        posture.goToPosture("Handstand", 1.0)
+
+
+def test_applying_a_posture_near_the_present_one(posture: Any, motion: Any) -> None:
+    motion.angleInterpolationWithSpeed("HeadYaw", 0.5, 1.0)
+    assert posture.applyPosture("Stand", 1.0) is True
+    assert motion.getAngles("HeadYaw", False) == pytest.approx([0.0])
+
+
+def test_angles_are_set_changed_and_interpolated(motion: Any) -> None:
+    motion.angleInterpolation(["HeadYaw", "HeadPitch"], [0.3, 0.1], 0.3, True)
+    assert motion.getAngles("Head", False) == pytest.approx([0.3, 0.1])
+    assert motion.getAngles("Head", True) == pytest.approx([0.3, 0.1], abs=0.05)
+    motion.angleInterpolation("HeadYaw", [[0.1, -0.1]], [[0.2, 0.4]], False)
+    assert motion.getAngles("HeadYaw", False) == pytest.approx([0.2])
+    motion.setAngles("LHand", 1.0, 0.5)
+    motion.changeAngles("HeadYaw", -0.2, 0.5)
+    while motion.moveIsActive():
+        time.sleep(0.02)
+    assert motion.getAngles(["HeadYaw", "LHand"], False) == pytest.approx([0.0, 1.0])
+
+
+def test_stopping_ends_what_another_call_waits_for(motion: Any) -> None:
+    waiting = motion.angleInterpolation("HeadYaw", 1.0, 30.0, True, _async=True)
+    while not motion.moveIsActive():
+        time.sleep(0.02)
+    motion.stopMove()
+    waiting.value(TIMEOUT)
+    assert motion.moveIsActive() is False
+    assert motion.getAngles("HeadYaw", False)[0] < 0.9
+
+
+def test_stiffness(motion: Any) -> None:
+    motion.setStiffnesses("Head", 0.5)
+    assert motion.getStiffnesses("Head") == [0.5, 0.5]
+    motion.stiffnessInterpolation("Head", 1.0, 0.2)
+    assert motion.getStiffnesses("Head") == [1.0, 1.0]
+
+
+def test_rest_and_wake_up(motion: Any, posture: Any) -> None:
+    assert motion.robotIsWakeUp() is True
+    motion.rest()
+    assert motion.robotIsWakeUp() is False
+    assert set(motion.getStiffnesses("Body")) == {0.0}
+    motion.wakeUp()
+    assert motion.robotIsWakeUp() is True
+    assert posture.getPosture() == "StandInit"
+
+
+def test_the_robots_own_frame_starts_where_it_does(motion: Any) -> None:
+    assert motion.getRobotPosition(True) == pytest.approx([0, 0, 0], abs=0.05)
+    assert motion.getRobotVelocity() == pytest.approx([0, 0, 0], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("method", "args", "said"),
+    [
+        ("getAngles", ("Tail", True), "cannot find joint 'Tail'"),
+        ("setAngles", ("Head", [0.1], 0.5), "1 values for 2 joints"),
+        ("setAngles", ("HeadYaw", "left", 0.5), "as a number"),
+        ("setAngles", ("HeadYaw", 0.1, 2.0), "cannot move at 2"),
+        ("angleInterpolation", ("HeadYaw", 0.1, 1e6, True), "divide the movement"),
+        ("angleInterpolation", ("HeadYaw", 0.1, -1.0, True), "rising times"),
+        ("stiffnessInterpolation", ("HeadYaw", 0.1, -1.0), "cannot take times"),
+    ],
+)
+def test_wrong_calls_are_answered_with_the_reason(motion: Any, method: str, args: tuple[Any, ...], said: str) -> None:
+    with pytest.raises(RuntimeError, match=f"ALMotion::{method}") as caught:
+        getattr(motion, method)(*args)
+    assert said in str(caught.value)
+
+
+def test_walking_is_not_offered(motion: Any) -> None:
+    assert not hasattr(motion, "moveTo")
