@@ -1,4 +1,5 @@
+# For catkin_python_setup only; pip reads pyproject.toml.
 from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import find_packages, setup
+from setuptools import setup
 
-setup(**generate_distutils_setup(packages=find_packages("src"), package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=["rapp_agent", "rapp_api", "rapp_core"], package_dir={"": "src"}))

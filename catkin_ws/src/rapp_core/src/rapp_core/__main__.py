@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 import threading
-import time
 
 import rospy
 
@@ -14,13 +13,15 @@ from rapp_agent import Subsystem
 from rapp_core.config import Config, read
 from rapp_core.control.control import Control, Parts
 from rapp_core.control.fsm import core_machine
-from rapp_core.control.lease import Lease
 from rapp_core.control.platform import Platform
-from rapp_core.errors import Invalid
+from rapp_core.errors import CoreError, Invalid
 from rapp_core.launcher.launcher import Launcher
+from rapp_core.launcher.lease import Lease
+from rapp_core.ports import Voice
 from rapp_core.robot.naoqi import robot
 from rapp_core.robot.naoqi.connection import Connection
 from rapp_core.ros.hop import RosHop
+from rapp_core.ros.node import join, leave, log_to_stderr
 from rapp_core.ros.services import RosServices
 from rapp_core.ros.state import StatePublisher
 from rapp_core.services.context import Context
@@ -33,61 +34,60 @@ _log = logging.getLogger(__name__)
 
 def main() -> int:
     """Run the core agent; gives the exit status."""
-    _log_to_stderr()
-    try:
-        config = read(sys.argv[1:])
-    except Invalid as error:
-        _log.error("%s", error)
-        return 2
+    log_to_stderr()
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    rospy.init_node("core_agent", disable_signals=True)
-    _log_to_stderr()
-    _run(config, stop)
-    rospy.signal_shutdown("the core agent ends")
+    try:
+        config = read(sys.argv[1:])
+        launcher = Launcher(config, _ros_environment())
+        launcher.open()
+    except (CoreError, OSError) as error:
+        _log.error("%s", error)
+        return 2 if isinstance(error, Invalid) else 1
+    try:
+        if join("core_agent", stop):
+            _run(config, launcher, stop)
+            leave()
+    finally:
+        launcher.close()
     return 0
 
 
-def _log_to_stderr() -> None:
-    """Also after rospy has put its own handlers in place of everybody's."""
-    line = "%(asctime)s %(name)s %(levelname)s %(message)s"
-    logging.basicConfig(level=logging.INFO, format=line, stream=sys.stderr, force=True)
-    for logger in map(logging.getLogger, list(logging.root.manager.loggerDict)):
-        logger.disabled = False
-
-
-def _run(config: Config, stop: threading.Event) -> None:
+def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     connection = Connection(config.robot, config.naoqi_timeout)
     nao = robot(connection, config)
     trace, states, lease = Trace(), StatePublisher(), Lease(config)
     trace.listen(states.tell)
-
-    def recordings() -> "os.PathLike[str]":
-        run = lease.holder
-        return run.folders.recordings if run is not None else config.home / "listening"
-
-    context = Context(nao, config, trace, lease.cut, time.monotonic, recordings)  # type: ignore[arg-type]
-    executor, hop = Executor(context), RosHop()
-    launcher = Launcher(config, _ros_environment())
+    executor, hop = Executor(Context(nao, config, trace, config.home / "listening")), RosHop(stop)
     platform = Platform(hop, config, trace)
     control = Control(Parts(nao, hop, launcher, executor, platform, lease, trace, config, stop))
     services = RosServices(executor, Outside(hop, config, trace), lease, trace)
     machine = core_machine(control)
     machine.listen(trace.core_event)
+    threading.Thread(target=_hush_at_end, args=(nao.voice, stop), name="hush", daemon=True).start()
     print("READY " + json.dumps({"node": rospy.get_name()}), flush=True)
     share = Subsystem("core", memory={"problem": None})
     try:
         while not stop.is_set():
             machine.step(share)
     finally:
-        platform.close()
+        stop.set()
         control.close()
-        launcher.close()
+        platform.close()
         services.close()
         hop.close()
         states.close()
         connection.close()
+
+
+def _hush_at_end(voice: Voice, stop: threading.Event) -> None:
+    """Stop speaking when the process is told to end: its main thread may be waiting for a text to be said."""
+    stop.wait()
+    try:
+        voice.hush()
+    except CoreError as error:
+        _log.info("%s", error)
 
 
 def _ros_environment() -> dict[str, str]:

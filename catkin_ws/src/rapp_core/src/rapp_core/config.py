@@ -1,10 +1,11 @@
 """Settings of the core agent: one frozen object, from a file, then environment, then options."""
 
 import argparse
+import math
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,23 +30,27 @@ class Config:
     """Every setting and bound of the core agent."""
 
     robot: str = "tcp://127.0.0.1:9559"  # NAOqi
-    home: Path = Path(platformdirs.user_data_dir("rapp"))  # $RAPP_HOME
+    home: Path = field(default_factory=lambda: platformdirs.user_data_path("rapp"))  # $RAPP_HOME
     name: str = "nao"  # of this robot, at the platform
     kind: str = "nao"
     language: str = "en"  # of the person
     threshold: float = 0.4  # probability below which a word counts as unrecognised (paper section V.A.2)
     recognise_timeout: float = 8.0  # s that rapp_recognize listens unless told otherwise
-    long_command: float = 1.0  # s; a longer sound that is no keyword is a long command
+    long_command: float = 1.4  # s; a longer sound that is no keyword is a long command; includes the detector's hang-over
+    longest_keyword: float = 2.5  # s; a longer sound is no isolated keyword, whatever the recogniser makes of it
+    longest_command: float = 30.0  # s; what goes on longer is taken as it is
     end_of_command: float = 0.8  # s of quiet that end a long command
-    verdict: float = 0.6  # s the recogniser may take after the end of a sound
-    listening_round: float = 20.0  # s after which a quiet listening round starts anew
+    verdict: float = 0.8  # s the recogniser may take after the end of a sound
+    listening_round: float = 10.0  # s after which a quiet listening round, and its recording, start anew
     naoqi_timeout: float = 5.0  # s for calls of NAOqi that return at once
     register_timeout: float = 4.0  # s
-    register_again: float = 10.0  # s between tries while the platform is away
+    register_again: float = 5.0  # s between tries while the platform is away
+    catalogue_again: float = 60.0  # s between looks at the platform's catalogue
     interpret_timeout: float = 30.0  # s
     install_timeout: float = 60.0  # s
     cloud_call_timeout: float = 30.0  # s for a dynamic agent's cloud call unless told otherwise
     mail_timeout: float = 60.0  # s
+    warm_up: float = 20.0  # s for a spare to import rospy and join ROS
     first_word: float = 15.0  # s from activation to the dynamic agent's first word
     heartbeat: float = 1.0  # s without a heartbeat after which the lease is silent
     hang: float = 10.0  # s the dynamic agent's own loop may stand still outside of core services
@@ -82,11 +87,13 @@ def _with_file(config: Config, path: Path) -> Config:
 
 
 def _checked(cls: type[Any], values: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    known = {field.name: field.default for field in fields(cls)}
+    known = {item.name: "" if item.default is MISSING else item.default for item in fields(cls)}
     for name, value in values.items():
         if name not in known:
             raise Invalid(f"cannot use the settings in {path}: there is no {name}; known are {', '.join(known)}")
         wanted = type(known[name])
-        if not isinstance(value, wanted | int if wanted is float else (str if wanted is not int else int)):
+        if isinstance(value, bool) or not isinstance(value, (int, float) if wanted is float else wanted):
             raise Invalid(f"cannot use the settings in {path}: {name} must be a {wanted.__name__}")
+        if isinstance(value, int | float) and not 0 < value < math.inf:
+            raise Invalid(f"cannot use the settings in {path}: {name} must be above 0")
     return {name: Path(value) if name == "home" else value for name, value in values.items()}

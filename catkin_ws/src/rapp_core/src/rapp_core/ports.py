@@ -80,7 +80,7 @@ class Body(Protocol):
         """Stop all motion now."""
 
     def release(self) -> None:
-        """Take a safe posture and switch the motors off."""
+        """Take a safe posture and switch the motors off; goes on by itself when it takes longer than a moment."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,7 @@ class Robot:
     recorder: Recorder
     player: Player
     body: Body
+    present: Callable[[], bool]  # whether the robot is connected at this moment
 
 
 Progress = Callable[[str, float], None]

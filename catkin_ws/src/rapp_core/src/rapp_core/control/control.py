@@ -9,11 +9,11 @@ from typing import Any
 
 from rapp_agent import Subsystem
 from rapp_core.config import Config
-from rapp_core.control.lease import Lease
 from rapp_core.control.listening import Listener
 from rapp_core.control.platform import Platform
 from rapp_core.errors import CoreError, Refused, Unreachable
 from rapp_core.launcher.launcher import Launcher
+from rapp_core.launcher.lease import Lease
 from rapp_core.launcher.run import Run
 from rapp_core.ports import Hop, Robot
 from rapp_core.services.executor import Executor
@@ -21,6 +21,7 @@ from rapp_core.trace import Happening, Trace
 
 _log = logging.getLogger(__name__)
 STEP = 0.05  # s between two looks at the dynamic agent
+HURRIED = 0.2  # s for a dynamic agent that did not end by itself to stop what it has started
 RETRY = 1.0  # s between tries to reach the robot
 DYNAMIC_KINDS = ("entered", "left", "failed")
 
@@ -56,22 +57,13 @@ class Control:
     # s1, s2: initialise, register
 
     def initialise(self, share: Subsystem) -> None:
-        """Reach the robot, stop whatever moves, warm a spare."""
+        """Reach the robot, stop whatever moves or sounds, warm a spare."""
         parts = self._parts
         self._recording.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            parts.robot.body.stop()
-            parts.robot.player.stop()
-        except Refused as error:
-            _log.warning("%s", error)
-        except CoreError as error:
-            _log.warning("%s; trying again", error)
-            share.memory["ready"] = False
-            parts.stop.wait(RETRY)
-            return
-        parts.launcher.clear_orphans()
         parts.launcher.prepare()
-        share.memory["ready"] = True
+        share.memory["ready"] = self._still()
+        if not share.memory["ready"]:
+            parts.stop.wait(RETRY)
 
     def initialised(self, share: Subsystem) -> bool:
         """Whether the robot has answered."""
@@ -121,8 +113,13 @@ class Control:
             share.memory["problem"] = NOT_UNDERSTOOD
 
     def download(self, share: Subsystem) -> None:
-        """Have the link download, verify and install the RApp; without the platform the installed one will do."""
+        """Have the link download, verify and install the RApp, unless it is here already."""
         parts, name = self._parts, str(share.memory["rapp"])
+        here = parts.platform.runnable(name)
+        if here is not None:
+            parts.trace.message(f"core: {name} {here.version} is installed")
+            share.memory["package"] = here.path
+            return
         parts.trace.message(f"core->repository install {name}")
         try:
             answer = parts.hop.request("install", {"name": name}, parts.config.install_timeout, self._progress)
@@ -155,8 +152,11 @@ class Control:
     def await_first_word(self, share: Subsystem) -> None:
         """Wait for the dynamic agent's first word over its channel."""
         run = self._present()
-        run.first_word.wait(STEP)
-        if not run.first_word.is_set() and (not run.alive or time.monotonic() > float(str(share.memory["until"]))):
+        if run.first_word.wait(STEP):
+            return
+        late = time.monotonic() > float(str(share.memory["until"]))
+        if late or self._parts.stop.is_set() or self._parts.lease.problem(True) is not None or run.outcome is not None:
+            _log.warning("run %s: no first word: %s", run.name, run.outcome or "dead, silent or late")
             share.memory["problem"] = "It did not start"
 
     def first_word_or_over(self, share: Subsystem) -> bool:
@@ -184,44 +184,65 @@ class Control:
     # s10, s11: destroy, apologise
 
     def destroy(self, _share: Subsystem) -> None:
-        """Stop the robot, dismantle in the order of DESIGN section 3.5, kill, release the lease, warm the next spare."""
+        """Dismantle in the order of DESIGN section 3.5, kill, release the lease, warm the next spare.
+
+        The robot is stopped before anything that takes time; a run that has not come to its end by itself is not waited for.
+        """
         run, parts = self._present(), self._parts
         if run.outcome is None:
+            parts.lease.release()
             self._still()
         if run.alive:
             parts.trace.message("core->dynamic dismantle")
-            run.dismantle(parts.config.dismantle if run.outcome is not None else 0.2)
+            run.dismantle(parts.config.dismantle if run.outcome is not None else HURRIED, parts.stop)
         parts.lease.release()
         self._still()
-        run.end(parts.config.terminate)
-        parts.trace.message("core: dynamic agent destroyed")
-        self._run = None
+        self._end_run()
         parts.launcher.prepare()
 
-    def _still(self) -> None:
-        for stop in (self._parts.robot.body.stop, self._parts.robot.player.stop, self._parts.robot.voice.hush):
+    def _end_run(self) -> None:
+        run, parts = self._present(), self._parts
+        keep = parts.launcher.log_of(run.manifest) if run.manifest is not None else None
+        run.end(parts.config.terminate, keep)
+        self._run = None
+        parts.trace.message("core: dynamic agent destroyed")
+
+    def _still(self) -> bool:
+        """Stop all motion and sound; gives False when the robot is away."""
+        robot, reached = self._parts.robot, True
+        for stop in (robot.body.stop, robot.player.stop, robot.voice.hush):
             try:
                 stop()
+            except Refused as error:
+                _log.info("%s", error)
             except CoreError as error:
                 _log.warning("%s", error)
+                reached = False
+        return reached
 
     def apologise(self, share: Subsystem) -> None:
         """Say aloud what failed; a state that raised an error comes here too."""
         error = share.memory.get("error")
-        if isinstance(error, Exception):
+        if isinstance(error, Unreachable):
+            _log.warning("%s", error)
+        elif isinstance(error, Exception):
             _log.error("state failed", exc_info=error)
-        self._say(str(share.memory.get("problem") or "Something went wrong"))
+        if self._run is not None:
+            self.destroy(share)
+        if not self._say(str(share.memory.get("problem") or "Something went wrong")):
+            self._parts.stop.wait(RETRY)
 
     def close(self) -> None:
-        """End a run that still lives; the robot rests."""
+        """Stop the robot, end a run that still lives, let the robot rest."""
+        self._parts.lease.release()
+        reached = self._still()
         if self._run is not None:
-            self._parts.lease.release()
-            self._run.end(self._parts.config.terminate)
-        try:
-            self._parts.robot.body.stop()
-            self._parts.robot.body.release()
-        except CoreError as error:
-            _log.warning("%s", error)
+            self._end_run()
+        if reached:
+            try:
+                self._parts.robot.body.release()
+            except CoreError as error:
+                _log.info("%s", error)
 
     def _present(self) -> Run:
         assert self._run is not None
@@ -231,11 +252,13 @@ class Control:
         _log.warning("%s: %s", words, error)
         share.memory["problem"] = words
 
-    def _say(self, text: str) -> None:
+    def _say(self, text: str) -> bool:
         try:
             self._parts.executor.run("rapp_say", text=text, language="en")
         except CoreError as error:
             _log.warning("%s", error)
+            return False
+        return True
 
     def _told(self, message: dict[str, Any]) -> None:
         trace = self._parts.trace

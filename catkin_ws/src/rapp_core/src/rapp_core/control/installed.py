@@ -1,8 +1,13 @@
 """The RApps on this robot's disk, as the link installs them: $RAPP_HOME/rapps/<name>/current/."""
 
-import json
+import logging
 from dataclasses import dataclass
 from pathlib import Path
+
+from rapp_core.errors import Invalid
+from rapp_core.launcher.manifest import read_manifest
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -10,18 +15,20 @@ class Known:
     """A RApp the robot can run: installed (`path` is its package) or offered by the platform (`path` is None)."""
 
     name: str
+    version: str
     keywords: tuple[str, ...]
     path: Path | None
 
 
 def installed(home: Path, language: str) -> dict[str, Known]:
-    """All installed RApps whose package.json can be read, by name."""
+    """All installed RApps whose package.json can be read, by name; a broken one is the link's to repair."""
     found = {}
     for path in sorted((home / "rapps").glob("*/current")):
         try:
-            manifest = json.loads((path / "package.json").read_text())
-            keywords = tuple(str(k) for k in manifest["rapp"]["keywords"].get(language, ()))
-            found[str(manifest["name"])] = Known(str(manifest["name"]), keywords, path.resolve())
-        except (OSError, ValueError, KeyError, AttributeError, TypeError):
-            continue  # a half-written package is the link's to repair; the others still run
+            manifest = read_manifest(path.resolve())
+        except Invalid as error:
+            _log.warning("%s", error)
+            continue
+        words = manifest.keywords.get(language, ())
+        found[manifest.name] = Known(manifest.name, manifest.version, words, path.resolve())
     return found

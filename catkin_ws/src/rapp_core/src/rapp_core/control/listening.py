@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rapp_core.config import Config
+from rapp_core.errors import Unreachable
 from rapp_core.ports import Robot, Sound, Word
 
 STEP = 0.02  # s
@@ -21,7 +22,10 @@ class Listener:
         self._heard: deque[tuple[float, Word | Sound]] = deque(maxlen=256)
 
     def round(self, keywords: Sequence[str], recording: Path, stop: threading.Event) -> str | Path | None:
-        """Listen once: a keyword (as spelt in `keywords`), the recording of a long command, or None when all was quiet."""
+        """Listen once: a keyword (as spelt in `keywords`), the recording of a long command, or None when all was quiet.
+
+        Raises Unreachable when the robot is lost meanwhile.
+        """
         self._heard.clear()
         ears, recorder = self._robot.ears, self._robot.recorder
         if keywords:
@@ -30,25 +34,26 @@ class Listener:
         try:
             ears.subscribe(lambda item: self._heard.append((self._now(), item)))
             try:
-                return self._poll(recording, stop)
+                return self._poll(frozenset(keywords), recording, stop)
             finally:
                 ears.unsubscribe()
         finally:
             recorder.stop()
 
-    def _poll(self, recording: Path, stop: threading.Event) -> str | Path | None:
+    def _poll(self, keywords: frozenset[str], recording: Path, stop: threading.Event) -> str | Path | None:
         until = self._now() + self._config.listening_round
         speech = _Speech(self._config)
         while not stop.wait(STEP):
             while self._heard:
                 at, item = self._heard.popleft()
-                if isinstance(item, Word):
-                    if item.probability >= self._config.threshold:
-                        return item.text
-                else:
+                if isinstance(item, Sound):
                     speech.take(at, item)
+                elif item.probability >= self._config.threshold and item.text in keywords and speech.may_be_keyword():
+                    return item.text
             if speech.is_command(self._now()):
                 return recording
+            if not self._robot.present():
+                raise Unreachable("cannot listen: the robot is away")
             if self._now() > until and speech.quiet(self._now()):
                 return None
         return None
@@ -74,10 +79,18 @@ class _Speech:
     def _pause(self) -> float:
         return max(self._config.end_of_command, self._config.verdict)
 
+    def may_be_keyword(self) -> bool:
+        """Whether what was said is short enough; a word may be told before the end of its sound, or without any."""
+        if self._begun is None or self._ended is None:
+            return True
+        return self._ended - self._begun <= self._config.longest_keyword
+
     def is_command(self, now: float) -> bool:
         """Whether an utterance longer than a keyword has ended, and the recogniser has had its time."""
-        if self._begun is None or self._ended is None:
+        if self._begun is None:
             return False
+        if self._ended is None:
+            return now - self._begun >= self._config.longest_command
         return self._ended - self._begun >= self._config.long_command and now - self._ended >= self._pause
 
     def quiet(self, now: float) -> bool:

@@ -24,43 +24,62 @@ class Platform:
         self._stop = threading.Event()
         self._offered: dict[str, Known] = {}
         self._registered = False
-        self._thread = threading.Thread(target=self._keep_registered, name="platform", daemon=True)
+        self._thread: threading.Thread | None = None
 
     def register(self) -> bool:
         """Register and fetch the catalogue once; gives whether it worked. Later tries follow in the background."""
-        worked = self._try()
-        self._thread.start()
+        worked = self.attempt()
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._keep_up, name="platform", daemon=True)
+            self._thread.start()
         return worked
 
     def close(self) -> None:
         """End the tries."""
         self._stop.set()
+        if self._thread is not None:
+            self._thread.join(1)
 
     def rapps(self) -> dict[str, Known]:
-        """All RApps that can be asked for, installed ones first."""
+        """All RApps that can be asked for, by name; the installed form of one goes before the offered one."""
         return {**self._offered, **installed(self._config.home, self._config.language)}
 
-    def _try(self) -> bool:
+    def runnable(self, name: str) -> Known | None:
+        """The installed RApp when the platform offers no other version of it; it can be run without a download."""
+        known, offered = installed(self._config.home, self._config.language).get(name), self._offered.get(name)
+        return known if known is not None and (offered is None or offered.version == known.version) else None
+
+    def attempt(self) -> bool:
+        """Register unless that is done, and fetch the catalogue; gives whether it worked."""
         config = self._config
         robot = {"robot": config.name, "kind": config.kind, "api_version": API_VERSION}
         try:
-            self._trace.message("core->repository register")
-            self._hop.request("register", robot, config.register_timeout)
+            if not self._registered:
+                self._trace.message("core->repository register")
+                self._hop.request("register", robot, config.register_timeout)
+                self._registered = True
+                self._trace.message("repository->core registered")
             catalogue = self._hop.request("list_rapps", {}, config.register_timeout)
+            known = map(self._known, catalogue["rapps"])
+            self._offered = {entry.name: entry for entry in known if entry is not None}
         except CoreError as error:
             _log.warning("not registered: %s", error)
+            self._registered = False
             return False
-        self._offered = {known.name: known for known in map(self._known, catalogue["rapps"]) if known is not None}
-        self._registered = True
+        except (KeyError, TypeError, AttributeError) as error:
+            _log.error("the platform's catalogue cannot be used: %r", error)
+            return False
         return True
 
     def _known(self, entry: dict[str, Any]) -> Known | None:
         if not entry.get("compatible", True):
             _log.info("not for this robot: %s (%s)", entry["name"], "; ".join(entry.get("reasons", ())))
             return None
-        return Known(entry["name"], tuple(entry["keywords"].get(self._config.language, ())), None)
+        return Known(entry["name"], entry["version"], tuple(entry["keywords"].get(self._config.language, ())), None)
 
-    def _keep_registered(self) -> None:
-        while not self._stop.wait(self._config.register_again):
-            if not self._registered or not self._offered:
-                self._try()
+    def _keep_up(self) -> None:
+        while not self._stop.wait(self._pause()):
+            self.attempt()
+
+    def _pause(self) -> float:
+        return self._config.catalogue_again if self._registered and self._offered else self._config.register_again

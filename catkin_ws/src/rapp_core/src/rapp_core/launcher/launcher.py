@@ -1,132 +1,150 @@
 """Keeps one confined child warm, and turns it into a dynamic agent on demand (DESIGN section 3.6)."""
 
-import json
+import fcntl
 import logging
 import os
 import secrets
 import shutil
 import socket
-import subprocess
-import threading
 from pathlib import Path
-from typing import Any
 
 from rapp_core.config import Config
-from rapp_core.errors import Bug, Invalid, Unreachable
+from rapp_core.errors import Bug, CoreError, Refused, Unreachable
+from rapp_core.launcher import orphans
 from rapp_core.launcher.channel import Channel
+from rapp_core.launcher.confined import Confined, adopt_orphans
+from rapp_core.launcher.manifest import Manifest, read_manifest
 from rapp_core.launcher.run import Run, Told
-from rapp_core.launcher.sandbox import RunFolders, command
+from rapp_core.launcher.sandbox import INSIDE_PRIVATE, RunFolders, command
 
 _log = logging.getLogger(__name__)
-WARM_UP = 20.0  # s for a spare to import rospy and join ROS
 
 
 class Launcher:
-    """Starts, hands out and ends dynamic agents. `prepare` is undone by `close`."""
+    """Starts, hands out and ends dynamic agents. `open` and `prepare` are undone by `close`.
+
+    All methods are for one thread that lives as long as the process (see `Confined`).
+    """
 
     def __init__(self, config: Config, ros: dict[str, str]) -> None:
         self._config = config
         self._ros = ros
         self._runs = config.home / "runs"
-        self._lock = threading.Lock()
         self._spare: Run | None = None
-        self._closed = False
+        self._lock: int | None = None
 
-    def clear_orphans(self) -> None:
-        """Remove what an earlier core agent left; its processes died with it (bubblewrap's --die-with-parent)."""
-        shutil.rmtree(self._runs, ignore_errors=True)
-        self._runs.mkdir(parents=True)
+    def open(self) -> None:
+        """Take the data folder, and clear what an earlier core agent left there. Raises Refused when another one uses it."""
+        if self._lock is None:
+            self._runs.mkdir(parents=True, exist_ok=True)
+            self._lock = os.open(self._config.home / "core_agent.lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+            try:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                self._unlock()
+                home = self._config.home
+                raise Refused(f"cannot use {home}: another core agent runs there; give this one its own --home") from error
+            orphans.clear(self._runs)
+            adopt_orphans()
 
     def prepare(self) -> None:
-        """Start a spare in the background, unless there is one."""
-        threading.Thread(target=self._prepare, name="spare", daemon=True).start()
-
-    def _prepare(self) -> None:
+        """Have a spare warming up; without one, activation takes longer, so a failure is only logged."""
+        if self._spare is not None and self._spare.alive:
+            return
         try:
-            with self._lock:
-                if not self._closed and (self._spare is None or not self._spare.alive):
-                    self._spare = self._start()
+            self._discard_spare()
+            self._spare = self._start()
         except Bug as error:
             _log.error("%s", error)
 
     def activate(self, package: Path, told: Told) -> Run:
         """Run the package as a dynamic agent; gives its run. Raises Invalid, Unreachable, Bug."""
-        entry, parameters = _manifest(package)
+        manifest = read_manifest(package)
         run = self._take()
         try:
-            shutil.copytree(package, run.folders.package, dirs_exist_ok=True)
-            run.activate(secrets.token_urlsafe(32), entry, parameters, told)
-        except (OSError, Unreachable) as error:
-            run.end(self._config.terminate)
-            raise Unreachable(f"cannot start {package.name}: {error}") from error
+            _copy(package, run.folders.package)
+            run.activate(secrets.token_urlsafe(32), manifest, told)
+        except (OSError, shutil.Error, CoreError) as error:
+            run.end(0.0)
+            raise Unreachable(f"cannot start {manifest.name}: {error}") from error
         return run
 
+    def log_of(self, manifest: Manifest) -> Path:
+        """Where what a RApp prints is kept after its run, until its next one."""
+        return self._config.home / "logs" / f"rapp-{manifest.name}.log"
+
     def _take(self) -> Run:
-        with self._lock:
-            run, self._spare = self._spare, None
-            if run is None or not run.alive:
-                run = self._start()
-        if not run.ready.wait(WARM_UP) or not run.alive:
-            tail = self._log_tail(run)
-            run.end(self._config.terminate)
-            raise Bug(f"cannot start a dynamic agent: its process did not become ready; it said: {tail}")
+        run, self._spare = self._spare, None
+        if run is not None and not run.alive:
+            _log.warning("the spare has died: %s", _tail(run))
+            run.end(0.0)
+            run = None
+        run = run or self._start()
+        if not run.wait_ready(self._config.warm_up):
+            said = _tail(run)
+            run.end(0.0)
+            raise Bug(f"cannot start a dynamic agent: its process did not become ready; it said: {said}")
         return run
 
     def _start(self) -> Run:
-        name = secrets.token_hex(6)
-        folders = RunFolders(self._runs / name)
+        folders = RunFolders(self._runs / secrets.token_hex(6), _account())
         folders.make()
         ours, theirs = socket.socketpair()
-        environment = {
+        try:
+            with folders.log.open("wb") as log, theirs:
+                words = command(folders, self._config.limits, self._environment(theirs.fileno()))
+                process = Confined(words, theirs.fileno(), log.fileno())
+        except Bug:
+            ours.close()
+            shutil.rmtree(folders.root, ignore_errors=True)
+            raise
+        orphans.note(folders.root, process.pid)
+        return Run(folders.root.name, folders, process, Channel(ours))
+
+    def _environment(self, channel: int) -> dict[str, str]:
+        return {
             **self._ros,
-            "RAPP_CHANNEL_FD": str(theirs.fileno()),
-            "HOME": "/rapp/private",
-            "TMPDIR": "/rapp/private",
-            "ROS_HOME": "/rapp/private/ros",
-            "ROS_LOG_DIR": "/rapp/private/ros/log",
+            "RAPP_CHANNEL_FD": str(channel),
+            "HOME": INSIDE_PRIVATE,
+            "TMPDIR": INSIDE_PRIVATE,
+            "ROS_HOME": f"{INSIDE_PRIVATE}/ros",
+            "ROS_LOG_DIR": f"{INSIDE_PRIVATE}/ros/log",
             "PATH": "/usr/bin:/bin",
             "LANG": "C.UTF-8",
             "PYTHONDONTWRITEBYTECODE": "1",
         }
-        words = command(folders, self._config.limits, environment)
-        with (folders.root / "agent.log").open("wb") as log, theirs:
-            try:
-                process = subprocess.Popen(
-                    words,
-                    stdin=subprocess.DEVNULL,
-                    stdout=log,
-                    stderr=log,
-                    pass_fds=(theirs.fileno(),),
-                    start_new_session=True,
-                    env={"PATH": os.environ.get("PATH", "/usr/bin:/bin")},
-                )
-            except OSError as error:
-                raise Bug(f"cannot start the sandbox: {error}; is bubblewrap installed?") from error
-        return Run(name, folders, process, Channel(ours))
-
-    @staticmethod
-    def _log_tail(run: Run) -> str:
-        log = run.folders.root / "agent.log"
-        return log.read_text(errors="replace")[-2000:] if log.exists() else ""
 
     def close(self) -> None:
-        """End the spare, and start no more."""
-        with self._lock:
-            self._closed = True
-            run, self._spare = self._spare, None
+        """End the spare, give the data folder free."""
+        self._discard_spare()
+        self._unlock()
+
+    def _discard_spare(self) -> None:
+        run, self._spare = self._spare, None
         if run is not None:
-            run.end(self._config.terminate)
+            run.end(0.0)  # it has done nothing yet that it could tidy up
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
 
-def _manifest(package: Path) -> tuple[str, dict[str, Any]]:
-    """Entry and parameters of an installed package. Raises Invalid."""
-    try:
-        rapp = json.loads((package / "package.json").read_text())["rapp"]
-        entry, parameters = rapp["entry"], rapp.get("parameters", {})
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise Invalid(f"cannot run {package}: its package.json cannot be used ({error}); install it anew") from error
-    if not isinstance(entry, str) or not (package / entry).resolve().is_relative_to(package.resolve()):
-        raise Invalid(f"cannot run {package}: its entry {entry!r} lies outside of it")
-    if not isinstance(parameters, dict):
-        raise Invalid(f"cannot run {package}: its parameters are no object")
-    return entry, parameters
+def _account() -> int | None:
+    """User id for one run: of its own, so that limits on processes bind and runs cannot touch each other; needs root.
+
+    Taken from 65000 to 65499, which Debian reserves (policy section 9.2.2).
+    """
+    return 65000 + secrets.randbelow(500) if os.geteuid() == 0 else None
+
+
+def _copy(package: Path, folder: Path) -> None:
+    """Copy a package for a run, readable for whoever runs it, without following links."""
+    shutil.copytree(package, folder, symlinks=True, dirs_exist_ok=True)
+    for path in (folder, *folder.rglob("*")):
+        if not path.is_symlink():
+            path.chmod(0o755 if path.is_dir() else 0o644)
+
+
+def _tail(run: Run) -> str:
+    return run.folders.log.read_text(errors="replace")[-2000:] if run.folders.log.exists() else ""

@@ -1,30 +1,32 @@
 """One run of a dynamic agent: its process, its channel, and what it has said of itself."""
 
-import contextlib
 import logging
-import os
 import shutil
-import signal
-import subprocess
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from rapp_core.errors import Invalid, Unreachable
 from rapp_core.launcher.channel import Channel
-from rapp_core.launcher.sandbox import RunFolders
+from rapp_core.launcher.confined import Confined
+from rapp_core.launcher.manifest import Manifest
+from rapp_core.launcher.sandbox import INSIDE_PACKAGE, RunFolders
 
 _log = logging.getLogger(__name__)
 Told = Callable[[dict[str, Any]], None]
+STEP = 0.05  # s between two looks
+LEAVING = 0.5  # s for a dynamic agent that has said "gone" to leave ROS and end by itself
 
 
 class Run:
     """A started process in its sandbox: first a warm spare, then, once activated, a dynamic agent. Used once."""
 
-    def __init__(self, name: str, folders: RunFolders, process: "subprocess.Popen[bytes]", channel: Channel) -> None:
+    def __init__(self, name: str, folders: RunFolders, process: Confined, channel: Channel) -> None:
         self.name = name
         self.token = ""  # secret of the lease, set at activation
+        self.manifest: Manifest | None = None  # of the RApp, set at activation
         self.folders = folders
         self.ready = threading.Event()
         self.first_word = threading.Event()
@@ -42,44 +44,52 @@ class Run:
     @property
     def alive(self) -> bool:
         """Whether its process runs."""
-        return self._process.poll() is None
+        return self._process.alive
 
-    def activate(self, token: str, entry: str, parameters: dict[str, Any], told: Told) -> None:
+    def wait_ready(self, seconds: float) -> bool:
+        """Wait for the spare to be warm; gives whether it is. Returns early when it has died."""
+        deadline = time.monotonic() + seconds
+        while not self.ready.wait(STEP) and self.alive and time.monotonic() < deadline:
+            pass
+        return self.ready.is_set() and self.alive
+
+    def activate(self, token: str, manifest: Manifest, told: Told) -> None:
         """Turn the spare into the dynamic agent whose package lies in the package folder. Raises Unreachable."""
         self.token = token
+        self.manifest = manifest
         self._told = told
         self.heartbeat = self.progress = time.monotonic()
         self._channel.send(
-            type="activate", run=self.name, token=token, package="/rapp/package", entry=entry, parameters=parameters
+            type="activate",
+            run=self.name,
+            token=token,
+            package=INSIDE_PACKAGE,
+            entry=manifest.entry,
+            parameters=manifest.parameters,
         )
 
-    def dismantle(self, patience: float) -> bool:
-        """Ask it to stop what it has started; gives whether it answered "gone" within `patience` s."""
+    def dismantle(self, patience: float, hurry: threading.Event) -> bool:
+        """Ask it to stop what it has started; gives whether it answered "gone" within `patience` s, or before `hurry`."""
         try:
             self._channel.send(type="dismantle")
         except Unreachable:
             return False
         deadline = time.monotonic() + patience
-        while self.alive and not self.gone.is_set() and time.monotonic() < deadline:
-            self.gone.wait(0.05)
+        while self.alive and not self.gone.is_set() and not hurry.is_set() and time.monotonic() < deadline:
+            self.gone.wait(STEP)
         return self.gone.is_set()
 
-    def end(self, patience: float) -> None:
-        """End and reap the process: SIGTERM, after `patience` s SIGKILL of its group; then remove its folders."""
-        if self.alive:
-            self._signal(signal.SIGTERM)
-        try:
-            self._process.wait(patience)
-        except subprocess.TimeoutExpired:
-            self._signal(signal.SIGKILL)
-            self._process.wait()
+    def end(self, patience: float, keep_log: Path | None = None) -> None:
+        """End and reap all its processes: SIGTERM, after `patience` s SIGKILL; then remove its folders."""
+        if self.gone.is_set():
+            self._process.wait(LEAVING)
+        self._process.end(patience)
         self._channel.close()
         self._reader.join(1)
+        if keep_log is not None and self.folders.log.exists():
+            keep_log.parent.mkdir(parents=True, exist_ok=True)
+            self.folders.log.replace(keep_log)
         shutil.rmtree(self.folders.root, ignore_errors=True)
-
-    def _signal(self, number: signal.Signals) -> None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self._process.pid, number)
 
     def _read(self) -> None:
         try:
@@ -98,12 +108,12 @@ class Run:
             self.ready.set()
         elif kind == "first_word":
             self.first_word.set()
-        elif kind == "gone":
-            self.gone.set()
-        elif kind == "terminate":
+        elif kind == "terminate" and self.outcome is None:
             self.outcome = (str(message.get("outcome")), str(message.get("detail", ""))[:500])
         if self._told is not None and kind in ("state", "first_word", "terminate", "gone"):
             self._told(message)
+        if kind == "gone":
+            self.gone.set()
 
     def _beat(self, count: object) -> None:
         self.heartbeat = time.monotonic()

@@ -18,13 +18,16 @@ NOBODY = "65534"
 SYSTEM = ("/usr", "/etc/alternatives", "/etc/hosts", "/etc/ld.so.cache", "/etc/nsswitch.conf", "/etc/localtime")
 RUNNER = "rapp_api.runner"
 PACKAGES = ("rapp_api", "rapp_agent", "rapp_msgs")
+INSIDE_PACKAGE = "/rapp/package"
+INSIDE_PRIVATE = "/rapp/private"
 
 
 @dataclass(frozen=True)
 class RunFolders:
-    """Folders of one run, outside the sandbox."""
+    """Folders of one run, outside the sandbox; `account` is the user id inside, None for our own."""
 
     root: Path
+    account: int | None
 
     @property
     def package(self) -> Path:
@@ -41,55 +44,64 @@ class RunFolders:
         """What the core agent records for this run; read-only inside, at the same path as outside."""
         return self.root / "recordings"
 
+    @property
+    def log(self) -> Path:
+        """What the run's processes print; not seen inside."""
+        return self.root / "agent.log"
+
     def make(self) -> None:
         """Create the folders; the private one belongs to whoever runs inside."""
         for folder in (self.package, self.private, self.recordings):
             folder.mkdir(parents=True)
-        self.root.chmod(0o711)
-        if os.geteuid() == 0:
-            os.chown(self.private, int(NOBODY), int(NOBODY))
+        if self.account is not None:
+            os.chown(self.private, self.account, self.account)
 
 
 def command(folders: RunFolders, limits: Limits, environment: dict[str, str]) -> list[str]:
-    """The words that start the runner inside the sandbox."""
-    words = [
-        "bwrap",
-        "--die-with-parent",
-        "--new-session",
-        "--unshare-ipc",
-        "--unshare-pid",
-        "--unshare-uts",
-        "--unshare-cgroup-try",
-    ]
+    """The words that start the runner inside the sandbox. Raises Bug when the Python packages cannot be found."""
+    recordings = str(folders.recordings)
+    read_only = [(path, path) for path in (*SYSTEM, *_python())]
+    read_only += [(str(folders.package), INSIDE_PACKAGE), (recordings, recordings)]
+    words = ["bwrap", "--die-with-parent", "--new-session"]
+    words += ["--unshare-ipc", "--unshare-pid", "--unshare-uts", "--unshare-cgroup-try"]
     words += ["--clearenv", "--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp"]
-    for path in (*SYSTEM, *_python()):
-        words += ["--ro-bind-try", path, path]
+    for folder in _parents([inside for _, inside in read_only]):
+        words += ["--perms", "0755", "--dir", folder]  # bubblewrap's own would be closed to other users
+    for outside, inside in read_only:
+        words += ["--ro-bind-try" if inside in SYSTEM else "--ro-bind", outside, inside]
     for name in ("bin", "lib", "lib64", "sbin"):
         words += ["--symlink", f"usr/{name}", f"/{name}"]
-    words += ["--ro-bind", str(folders.package), "/rapp/package", "--bind", str(folders.private), "/rapp/private"]
-    words += ["--ro-bind", str(folders.recordings), str(folders.recordings), "--chdir", "/rapp/private"]
+    words += ["--bind", str(folders.private), INSIDE_PRIVATE, "--chdir", INSIDE_PRIVATE]
     for name, value in environment.items():
         words += ["--setenv", name, value]
-    return [*words, *_unprivileged(), *_limited(limits), sys.executable, "-m", RUNNER]
+    words += ["--remount-ro", "/"]
+    return [*words, *_unprivileged(folders.account), *_limited(limits), sys.executable, "-m", RUNNER]
 
 
-def _python() -> Iterable[str]:
+def _parents(paths: Iterable[str]) -> list[str]:
+    """All folders above the paths, outermost first, but for the root."""
+    folders = {str(folder) for path in paths for folder in Path(path).parents}
+    return sorted(folders - {"/", "/tmp"})
+
+
+def _python() -> list[str]:
     """The virtual environment and the folders that hold the packages a dynamic agent imports."""
     found = {sys.prefix}
     for name in PACKAGES:
         spec = importlib.util.find_spec(name)
         if spec is None or spec.origin is None:
             raise Bug(f"cannot make a sandbox: package {name} is not installed here; run ./rapp help to set up")
-        place = Path(spec.origin).parent
-        found |= {str(place.parent), str(place.resolve().parent)}
-    return sorted(found)
+        init = Path(spec.origin)
+        found |= {str(init.parent.parent), str(init.resolve().parent.parent)}  # catkin links files from elsewhere
+    return sorted(path for path in found if not path.startswith("/usr/"))
 
 
-def _unprivileged() -> list[str]:
-    """Root becomes nobody inside, or the limit on processes would not bind; others are put into a user namespace."""
-    if os.geteuid() != 0:
+def _unprivileged(account: int | None) -> list[str]:
+    """Root becomes the run's account inside, or the limit on processes would not bind; others get a user namespace."""
+    if account is None:
         return ["--unshare-user", "--uid", NOBODY, "--gid", NOBODY]
-    drop = ["setpriv", "--reuid", NOBODY, "--regid", NOBODY, "--clear-groups", "--inh-caps", "-all", "--no-new-privs"]
+    drop = ["setpriv", "--reuid", str(account), "--regid", str(account), "--clear-groups"]
+    drop += ["--inh-caps", "-all", "--no-new-privs"]
     return ["--cap-drop", "ALL", "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", *drop]
 
 

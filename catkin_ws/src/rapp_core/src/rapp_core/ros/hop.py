@@ -13,7 +13,7 @@ from rapp_msgs.msg import HopEvent
 from rapp_msgs.srv import HopRequest
 from std_msgs.msg import String
 
-from rapp_core.errors import KINDS, Bug, Unreachable
+from rapp_core.errors import KINDS, Bug, Refused, Unreachable
 from rapp_core.ports import Progress
 
 SILENCE = 0.9  # s without a sign of life of the link after which it is gone
@@ -25,7 +25,9 @@ GONE = "cannot reach the link: it is not running, or rosbridge is away"
 class RosHop:
     """Each request is a job: accepted at once, ended by an event, by its time-out, or by the loss of the link."""
 
-    def __init__(self) -> None:
+    def __init__(self, stop: threading.Event) -> None:
+        """All waiting ends as Unreachable when `stop` is set."""
+        self._stop = stop
         self._lock = threading.Lock()
         self._jobs: dict[str, queue.Queue[Any]] = {}
         self._alive = float("-inf")
@@ -64,9 +66,8 @@ class RosHop:
 
     def _wait_present(self, until: float) -> None:
         while not self._reachable():
-            if time.monotonic() > until:
+            if time.monotonic() > until or self._stop.wait(STEP):
                 raise Unreachable(GONE)
-            time.sleep(STEP)
 
     def _ask(self, name: str, job: str, arguments: str, timeout: float) -> None:
         """Call the link's service in a thread of its own: rospy knows no time-out of a call."""
@@ -86,17 +87,17 @@ class RosHop:
         if isinstance(outcome, Exception):
             raise Unreachable(f"{GONE} ({outcome})") from outcome
         if not outcome.accepted:
-            raise KINDS["refused"](f"cannot {name}: {outcome.message}")
+            raise Refused(outcome.message or f"cannot {name}: the link does not accept it")
 
     def _wait(self, name: str, events: "queue.Queue[Any]", deadline: float, progress: Progress | None) -> Any:
         while True:
             try:
                 event = events.get(timeout=STEP)
             except queue.Empty:
-                if not self.present:
-                    raise Unreachable(f"cannot {name}: the link was lost") from None
+                if self._stop.is_set() or not self.present:
+                    raise Unreachable(f"cannot {name}: the link was lost; try again later") from None
                 if time.monotonic() > deadline:
-                    raise Unreachable(f"cannot {name}: no answer in time") from None
+                    raise Unreachable(f"cannot {name}: no answer in time; try again later") from None
                 continue
             if event.kind == HopEvent.PROGRESS:
                 if progress is not None:
@@ -104,7 +105,7 @@ class RosHop:
             elif event.kind == HopEvent.FAILED:
                 raise KINDS.get(event.error, Bug)(event.message)
             else:
-                return json.loads(event.result)
+                return _result(name, event.result)
 
     def _take(self, event: Any) -> None:
         with self._lock:
@@ -120,3 +121,10 @@ class RosHop:
         for subscriber in self._subscribers:
             subscriber.unregister()
         self._cancel.unregister()
+
+
+def _result(name: str, text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise Bug(f"cannot {name}: the link answered with what is no JSON ({error})") from error

@@ -7,16 +7,16 @@ from typing import Any
 import rapp_msgs.srv
 import rospy
 
-from rapp_core.control.lease import Lease
-from rapp_core.errors import CoreError
-from rapp_core.launcher.run import Run
+from rapp_core.errors import CoreError, Refused
+from rapp_core.launcher.lease import Grant, Lease
 from rapp_core.services.executor import Executor
 from rapp_core.services.outside import Outside
 from rapp_core.services.table import CORE_SERVICES, CoreService
 from rapp_core.trace import Trace
 
 _log = logging.getLogger(__name__)
-Handler = Callable[[Run, Any, Any], None]
+Handler = Callable[[Grant, Any, Any], None]
+OUTSIDE = frozenset({"rapp_cloud_call", "rapp_send_mail"})  # allowed call by call, see `services.outside`
 
 
 class RosServices:
@@ -37,36 +37,53 @@ class RosServices:
         def serve(request: Any) -> Any:
             response = cls._response_class()
             try:
-                run = self._lease.check(request._connection_header.get("rapp_channel"))
-                self._trace.message(f"dynamic->core {name}")
+                grant = self._lease.check(request._connection_header.get("rapp_channel"))
+            except Refused as error:
+                return _failed(name, response, error)
+            self._trace.message(f"dynamic->core {name}")
+            try:
                 with self._executor.counted():
-                    handler(run, request, response)
+                    _allow(grant, name)
+                    handler(grant, request, response)
                 response.success = True
             except CoreError as error:
-                _log.warning("%s: %s", name, error)
-                response.message = str(error)
-                if hasattr(response, "error"):
-                    response.error = error.kind
+                _failed(name, response, error)
             self._trace.message(f"core->dynamic reply {name}")
             return response
 
         return rospy.Service(name, cls, serve)
 
     def _core(self, row: CoreService) -> Handler:
-        def execute(_run: Run, request: Any, response: Any) -> None:
+        def execute(grant: Grant, request: Any, response: Any) -> None:
             fields = {name: getattr(request, name) for name in request.__slots__ if not name.startswith("_")}
-            for name, value in self._executor.run(row.name, **fields).items():
+            for name, value in self._executor.run_for(grant, row.name, **fields).items():
                 setattr(response, name, value)
 
         return execute
 
-    def _cloud_call(self, run: Run, request: Any, response: Any) -> None:
-        response.result = self._outside.cloud_call(run, request.service, request.arguments, request.timeout)
+    def _cloud_call(self, grant: Grant, request: Any, response: Any) -> None:
+        response.result = self._outside.cloud_call(grant.run, request.service, request.arguments, request.timeout)
 
-    def _send_mail(self, run: Run, request: Any, response: Any) -> None:
-        response.state = self._outside.send_mail(run, request.recipients, request.subject, request.body, request.attachment)
+    def _send_mail(self, grant: Grant, request: Any, response: Any) -> None:
+        response.state = self._outside.send_mail(
+            grant.run, request.recipients, request.subject, request.body, request.attachment
+        )
 
     def close(self) -> None:
         """Withdraw all services."""
         for service in self._services:
             service.shutdown("the core agent ends")
+
+
+def _allow(grant: Grant, name: str) -> None:
+    manifest = grant.run.manifest
+    if name not in OUTSIDE and (manifest is None or name not in manifest.core):
+        raise Refused(f"cannot call {name}: the RApp's package.json does not name it under permissions.core")
+
+
+def _failed(name: str, response: Any, error: CoreError) -> Any:
+    _log.warning("%s: %s", name, error)
+    response.message = str(error)
+    if hasattr(response, "error"):
+        response.error = error.kind
+    return response

@@ -9,7 +9,8 @@ from typing import Any
 
 from rapp_agent import Buffer, Machine, Subsystem
 from rapp_core.config import Config
-from rapp_core.errors import CoreError, Refused
+from rapp_core.errors import CoreError, Invalid, Refused
+from rapp_core.launcher.sandbox import INSIDE_PACKAGE
 from rapp_core.ports import Robot
 from rapp_core.trace import Trace
 
@@ -18,14 +19,26 @@ STEP = 0.02  # s between steps of a service that waits
 
 @dataclass(frozen=True)
 class Context:
-    """Shared by all services; `cut` ends whatever runs when set."""
+    """What all services share, and what belongs to the caller of one: `cut`, which ends the service when set, and folders."""
 
     robot: Robot
     config: Config
     trace: Trace
+    recordings: Path  # where the caller's recordings go
+    package: Path | None = None  # the caller's package, which it sees as `INSIDE_PACKAGE`
     cut: threading.Event = field(default_factory=threading.Event)
     now: Callable[[], float] = time.monotonic
-    recordings: Callable[[], Path] = Path  # folder of the present run's recordings
+
+    def readable(self, seen: str) -> Path:
+        """The file behind a path as the caller sees it: of its package or its recordings. Raises Invalid for any other."""
+        path = Path(seen)
+        if self.package is not None and path.is_relative_to(INSIDE_PACKAGE):
+            path = self.package / path.relative_to(INSIDE_PACKAGE)
+        path = path.resolve()
+        folders = [self.recordings] if self.package is None else [self.recordings, self.package]
+        if not any(path.is_relative_to(folder.resolve()) for folder in folders) or not path.is_file():
+            raise Invalid(f"cannot read {seen}: give a file of the RApp's package or one of its recordings")
+        return path
 
 
 class Reply(dict[str, Any]):

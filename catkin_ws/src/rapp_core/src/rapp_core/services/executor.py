@@ -3,9 +3,11 @@
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from typing import Any
 
 from rapp_core.errors import Refused
+from rapp_core.launcher.lease import Grant
 from rapp_core.services.context import Context, Reply, execute, subsystem
 from rapp_core.services.table import CORE_SERVICES, CoreService
 
@@ -13,7 +15,7 @@ PATIENCE = 10.0  # s a call waits for a resource another call holds
 
 
 class Executor:
-    """Runs the services' sub-FSMs in the callers' threads; counts those that are running."""
+    """Runs the services' sub-FSMs in the callers' threads; counts the dynamic agent's calls that are running."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
@@ -24,12 +26,12 @@ class Executor:
 
     @property
     def busy(self) -> bool:
-        """Whether a service runs at this moment."""
+        """Whether a call of the dynamic agent runs at this moment."""
         return self._running > 0
 
     @contextmanager
     def counted(self) -> Iterator[None]:
-        """Count a call that is not a sub-FSM, such as a cloud call, as running."""
+        """Count a dynamic agent's call as running."""
         with self._lock:
             self._running += 1
         try:
@@ -39,10 +41,19 @@ class Executor:
                 self._running -= 1
 
     def run(self, name: str, **request: Any) -> Reply:
-        """Execute one service; gives its reply. Raises CoreError."""
+        """Execute one service for the core agent itself; gives its reply. Raises CoreError."""
+        return self._execute(name, request, self._context)
+
+    def run_for(self, grant: Grant, name: str, **request: Any) -> Reply:
+        """Execute one service for the dynamic agent that holds the lease; cut short when the lease ends. Raises CoreError."""
+        folders = grant.run.folders
+        context = replace(self._context, cut=grant.cut, recordings=folders.recordings, package=folders.package)
+        return self._execute(name, request, context)
+
+    def _execute(self, name: str, request: dict[str, Any], context: Context) -> Reply:
         service = self._services[name]
-        with self.counted(), self._held(service):
-            return execute(service.machine(self._context), subsystem(name, **request), self._context)
+        with self._held(service):
+            return execute(service.machine(context), subsystem(name, **request), context)
 
     @contextmanager
     def _held(self, service: CoreService) -> Iterator[None]:

@@ -29,7 +29,9 @@ class Outside:
             values = json.loads(arguments or "{}")
         except ValueError as error:
             raise Invalid(f"cannot call {service}: its arguments are no JSON ({error})") from error
-        limit = timeout or self._config.cloud_call_timeout
+        if not isinstance(values, dict):
+            raise Invalid(f"cannot call {service}: its arguments must be a JSON object")
+        limit = timeout if timeout > 0 else self._config.cloud_call_timeout
         self._trace.message(f"dynamic->repository {service}")
         result = self._hop.request("call", {"service": service, "arguments": values}, limit)
         self._trace.message(f"repository->dynamic reply {service}")
@@ -54,10 +56,5 @@ class Outside:
 
     @staticmethod
     def _allowed(run: Run, service: str) -> None:
-        try:
-            rapp = json.loads((run.folders.package / "package.json").read_text())["rapp"]
-            allowed = rapp["permissions"]["cloud"]
-        except (OSError, ValueError, KeyError, TypeError):
-            allowed = []
-        if service not in allowed:
+        if run.manifest is None or service not in run.manifest.cloud:
             raise Refused(f"cannot call {service}: the RApp's package.json does not name it under permissions.cloud")

@@ -1,7 +1,6 @@
 """rapp_play_audio: playAudio of the deliverable."""
 
 import math
-from pathlib import Path
 
 from rapp_agent import Behaviour, Machine, Subsystem
 from rapp_core.errors import Invalid
@@ -12,12 +11,10 @@ def machine(context: Context) -> Machine:
     """Sub-FSM: delegate the file to e_ls; a loop goes on until the next play_audio or the end of the lease."""
 
     def play(share: Subsystem) -> None:
-        path = Path(request(share, "path"))
         position, volume, balance = (float(request(share, name)) for name in ("position", "volume", "balance"))
         if not (math.isfinite(position) and position >= 0 and 0 <= volume <= 1 and -1 <= balance <= 1):
             raise Invalid("cannot play: position must be 0 or more, volume 0 to 1, balance -1 to 1")
-        if not path.resolve().is_relative_to(context.config.home) or not path.is_file():
-            raise Invalid(f"cannot play {path}: no such file of this robot's data")
+        path = context.readable(request(share, "path"))
         player = context.robot.player
         player.stop()
         context.trace.message("core->ALAudioPlayer playFile")

@@ -7,6 +7,7 @@ from rapp_core.services.context import Context, reply, request
 
 EMPTY = "Empty"
 MOST = 100  # words
+LONGEST = 300.0  # s of listening
 
 
 class _Recognition:
@@ -29,7 +30,8 @@ class _Recognition:
         self._trace.message("core->ALSpeechRecognition subscribe")
         share.memory["undo"] = self._ears.unsubscribe
         self._ears.subscribe(lambda item: heard.put(item) if isinstance(item, Word) else None)
-        timeout = request(share, "timeout") or self._context.config.recognise_timeout
+        wish = request(share, "timeout")
+        timeout = min(wish, LONGEST) if wish > 0 else self._context.config.recognise_timeout
         share.memory["until"] = self._context.now() + timeout
 
     def take(self, share: Subsystem) -> None:

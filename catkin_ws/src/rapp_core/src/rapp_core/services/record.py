@@ -19,10 +19,12 @@ def machine(context: Context) -> Machine:
         duration = request(share, "duration")
         if not 0.1 <= duration <= LONGEST:
             raise Invalid(f"cannot record for {duration:g} s: 0.1 to {LONGEST:g} s are possible")
-        share.memory["until"] = context.now() + duration
-        share.memory["path"] = _new_path(context.recordings(), "")
+        share.memory["path"] = _new_path(context.recordings, "")
 
-    return _machine("rapp_record", context, check, lambda _share: None, lambda share: context.now() >= _until(share))
+    def over(share: Subsystem) -> bool:
+        return context.now() - _begun(share) >= float(request(share, "duration"))
+
+    return _machine("rapp_record", context, check, lambda _share: None, over)
 
 
 def until_silence_machine(context: Context) -> Machine:
@@ -32,16 +34,15 @@ def until_silence_machine(context: Context) -> Machine:
         waiting, limit = request(share, "waiting_time"), request(share, "microphone_energy")
         if not 0.1 <= waiting <= 60 or limit <= 0:
             raise Invalid("cannot record: a waiting time of 0.1 to 60 s and an energy above 0 are needed")
-        share.memory["path"] = _new_path(context.recordings(), request(share, "path"))
-        share.memory["longest"] = context.now() + LONGEST
-        share.memory["until"] = context.now() + waiting
+        share.memory["path"] = _new_path(context.recordings, request(share, "path"))
 
     def listen(share: Subsystem) -> None:
         if context.robot.recorder.energy() > request(share, "microphone_energy"):
-            share.memory["until"] = context.now() + request(share, "waiting_time")
+            share.memory["loud"] = context.now()
 
     def quiet(share: Subsystem) -> bool:
-        return context.now() >= min(_until(share), float(str(share.memory["longest"])))
+        now, loud = context.now(), share.memory.get("loud", _begun(share))
+        return now - float(str(loud)) >= request(share, "waiting_time") or now - _begun(share) >= LONGEST
 
     return _machine("rapp_record_until_silence", context, check, listen, quiet)
 
@@ -55,6 +56,7 @@ def _machine(name: str, context: Context, check: Transition, during: Transition,
         trace.message("core->ALAudioRecorder startMicrophonesRecording (asynchronous)")
         share.memory["undo"] = recorder.stop
         recorder.start(path)
+        share.memory["begun"] = context.now()
 
     def stop(share: Subsystem) -> None:
         trace.message("core->ALAudioRecorder stopMicrophonesRecording (asynchronous)")
@@ -78,8 +80,8 @@ def _machine(name: str, context: Context, check: Transition, during: Transition,
     )
 
 
-def _until(share: Subsystem) -> float:
-    return float(str(share.memory["until"]))
+def _begun(share: Subsystem) -> float:
+    return float(str(share.memory["begun"]))
 
 
 def _new_path(folder: Path, wish: str) -> Path:

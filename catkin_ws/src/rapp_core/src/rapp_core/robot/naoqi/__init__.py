@@ -18,4 +18,5 @@ def robot(connection: Connection, config: Config) -> Robot:
         NaoqiRecorder(connection),
         NaoqiPlayer(connection),
         NaoqiBody(connection),
+        lambda: connection.present,
     )

@@ -2,7 +2,7 @@
 
 from rapp_core.robot.naoqi.connection import Connection
 
-RESTING = 15.0  # s; the robot sits down before its motors are switched off
+MOMENT = 1.0  # s that are waited for the robot to rest; it goes on sitting down when nobody waits
 
 
 class NaoqiBody:
@@ -17,4 +17,4 @@ class NaoqiBody:
 
     def release(self) -> None:
         """See `ports.Body`."""
-        self._connection.call("ALMotion", "rest", timeout=RESTING)
+        self._connection.start("ALMotion", "rest").wait(round(MOMENT * 1000))

@@ -32,9 +32,16 @@ class Connection:
             session = qi.Session()
             try:
                 session.connect(self.url, _async=True).value(round(CONNECT_TIMEOUT * 1000))
-            except RuntimeError as error:
+            except (RuntimeError, ValueError) as error:
+                session.close()
                 raise Unreachable(f"cannot reach NAOqi at {self.url}: {error}; is the robot on?") from error
             self._session = session
+
+    @property
+    def present(self) -> bool:
+        """Whether the session is open at this moment."""
+        session = self._session
+        return session is not None and bool(session.isConnected())
 
     def close(self) -> None:
         """Leave the robot."""
@@ -53,13 +60,15 @@ class Connection:
                     fetched = self._session.service(module, _async=True)
                     self._services[module] = fetched.value(round(self._timeout * 1000))
                 except RuntimeError as error:
-                    raise Refused(f"cannot use {module}: this robot does not have it ({error})") from error
+                    if "Cannot find service" in str(error):
+                        raise Refused(f"cannot use {module}: this robot does not have it") from error
+                    raise self._translated(module, "service", str(error), self._timeout) from error
             return self._services[module]
 
     def call(self, module: str, method: str, *args: Any, timeout: float | None = None) -> Any:
         """Call a method and wait for its result, at most `timeout` s. Raises Unreachable, Refused, Bug."""
         future = self.start(module, method, *args)
-        limit = timeout or self._timeout
+        limit = self._timeout if timeout is None else timeout
         try:
             return future.value(round(limit * 1000))
         except RuntimeError as error:
@@ -76,10 +85,10 @@ class Connection:
             raise self._translated(module, method, str(error), self._timeout) from error
 
     def _translated(self, module: str, method: str, text: str, limit: float) -> Exception:
-        if "timeout" in text.lower():
-            return Unreachable(f"cannot wait for {module}.{method}: no answer in {limit:g} s")
-        if any(sign in text for sign in ("Session closed", "not connected", "Socket", "closed")):
+        if text.startswith("Future timeout"):
+            return Unreachable(f"cannot wait for {module}.{method}: no answer in {limit:g} s; is the robot overloaded?")
+        if not self.present or any(sign in text for sign in ("Session closed", "Socket is not connected")):
             return Unreachable(f"cannot reach NAOqi at {self.url}: the session was lost during {module}.{method}")
-        if f"{module}::" in text:
-            return Refused(f"cannot {method}: {text.splitlines()[-1].strip()}")
-        return Bug(f"cannot {method}: NAOqi answered: {text}")
+        if "At:" in text or "did not match" in text:  # a traceback of the module's program, or a call it does not know
+            return Bug(f"cannot {method}: {module} answered: {text}")
+        return Refused(f"cannot {method}: {text.splitlines()[-1].strip()}")

@@ -4,10 +4,23 @@ import hmac
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from rapp_core.config import Config
 from rapp_core.errors import Refused
 from rapp_core.launcher.run import Run
+
+CRASHED = "It has crashed"
+SILENT = "It does not answer any more"
+HANGS = "It hangs"
+
+
+@dataclass(frozen=True)
+class Grant:
+    """One lease of one run; `cut` is set when it ends, and ends the services that still run for it."""
+
+    run: Run
+    cut: threading.Event = field(default_factory=threading.Event)
 
 
 class Lease:
@@ -17,47 +30,42 @@ class Lease:
         self._config = config
         self._now = now
         self._lock = threading.Lock()
-        self._run: Run | None = None
-        self.cut = threading.Event()
-        """Set while nobody holds the lease after somebody did: running services end."""
-
-    @property
-    def holder(self) -> Run | None:
-        """The run that holds the lease."""
-        return self._run
+        self._grant: Grant | None = None
 
     def grant(self, run: Run) -> None:
-        """Give the lease to a run."""
+        """Give the lease to a run; whoever held it before holds it no more."""
+        self.release()
         with self._lock:
-            self._run = run
-            self.cut.clear()
+            self._grant = Grant(run)
 
     def release(self) -> None:
         """End the lease; services that still run are cut short."""
         with self._lock:
-            self._run = None
-            self.cut.set()
+            grant, self._grant = self._grant, None
+        if grant is not None:
+            grant.cut.set()
 
-    def check(self, secret: object) -> Run:
-        """The run that holds the lease; raises Refused when `secret` is not its own."""
+    def check(self, secret: object) -> Grant:
+        """The present lease; raises Refused when `secret` is not its holder's."""
         with self._lock:
-            run = self._run
-        if run is None or not isinstance(secret, str) or not hmac.compare_digest(secret.encode(), run.token.encode()):
+            grant = self._grant
+        if grant is None or not isinstance(secret, str) or not hmac.compare_digest(secret.encode(), grant.run.token.encode()):
             raise Refused("cannot serve this call: only the dynamic agent that holds the core agent's lease is served")
-        return run
+        return grant
 
     def problem(self, serving: bool) -> str | None:
         """What is wrong with the holder, said aloud; None when all is well. `serving`: a core service runs for it."""
-        run = self._run
-        if run is None:
+        with self._lock:
+            grant = self._grant
+        if grant is None:
             return None
-        now = self._now()
+        run, now = grant.run, self._now()
         if not run.alive:
-            return "It has crashed"
+            return CRASHED
         if now - run.heartbeat > self._config.heartbeat:
-            return "It does not answer any more"
+            return SILENT
         if serving:
             run.progress = now
         elif now - run.progress > self._config.hang:
-            return "It hangs"
+            return HANGS
         return None

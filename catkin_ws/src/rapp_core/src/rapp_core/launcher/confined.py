@@ -1,0 +1,108 @@
+"""The processes of one sandbox, from bubblewrap's own to the last grandchild: signalled, ended, reaped as one."""
+
+import contextlib
+import ctypes
+import json
+import os
+import select
+import signal
+import subprocess
+import time
+
+from rapp_core.errors import Bug
+
+INFORMED = 3.0  # s for bubblewrap to tell the process it has started
+KILLED = 2.0  # s for the kernel to end a process namespace
+NOTICED = 0.5  # s for bubblewrap to notice that and to end
+_PR_SET_CHILD_SUBREAPER = 36  # prctl(2)
+
+
+def adopt_orphans() -> None:
+    """Become the parent of what bubblewrap leaves when it ends first, so that it can be reaped; holds for this process."""
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+class Confined:
+    """bubblewrap (our child) and the first process of its namespace, whose end is the end of all others in there."""
+
+    def __init__(self, words: list[str], channel: int, log: int) -> None:
+        """Start the sandbox with one descriptor passed in. Raises Bug.
+
+        Call it from a thread that lives as long as this process: --die-with-parent means the starting thread.
+        """
+        told, tell = os.pipe()
+        try:
+            self._process = subprocess.Popen(
+                [words[0], "--info-fd", str(tell), *words[1:]],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                pass_fds=(channel, tell),
+                start_new_session=True,
+                env={"PATH": os.environ.get("PATH", os.defpath)},
+            )
+        except OSError as error:
+            os.close(told)
+            raise Bug(f"cannot start the sandbox: {error}; install the Debian package bubblewrap") from error
+        finally:
+            os.close(tell)
+        self.first = _first_process(told)
+        self._handle: int | None = None
+        with contextlib.suppress(OSError):  # it may have ended already
+            if self.first is not None:
+                self._handle = os.pidfd_open(self.first)
+
+    @property
+    def pid(self) -> int:
+        """Process id of bubblewrap, also its group's."""
+        return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether the program inside runs."""
+        return self._process.poll() is None
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for the program inside to end; gives whether it has."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+        return not self.alive
+
+    def end(self, patience: float) -> None:
+        """SIGTERM to the processes inside, after `patience` s SIGKILL to all; returns when none is left."""
+        if self.alive and self.first is not None:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self.first, signal.SIGTERM)
+            self.wait(patience)
+        self._kill()
+        self._process.wait()
+
+    def _kill(self) -> None:
+        handle, self._handle = self._handle, None
+        if handle is not None:
+            with contextlib.suppress(ProcessLookupError):
+                signal.pidfd_send_signal(handle, signal.SIGKILL)
+            select.select([handle], [], [], KILLED)
+            os.close(handle)
+        if not self.wait(NOTICED):
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+        if self.first is not None:
+            with contextlib.suppress(ChildProcessError):  # bubblewrap has reaped it itself
+                os.waitpid(self.first, os.WNOHANG)
+
+
+def _first_process(told: int) -> int | None:
+    """Process id that bubblewrap writes as JSON; None when it ended without."""
+    text, deadline = b"", time.monotonic() + INFORMED
+    try:
+        while select.select([told], [], [], max(0.0, deadline - time.monotonic()))[0]:
+            piece = os.read(told, 4096)
+            text += piece
+            if not piece or b"}" in text:
+                break
+    finally:
+        os.close(told)
+    with contextlib.suppress(ValueError, KeyError, TypeError):
+        return int(json.loads(text)["child-pid"])
+    return None
