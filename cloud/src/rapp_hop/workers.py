@@ -1,21 +1,21 @@
 """Worker processes for CPU-heavy work: each holds one object made by `setup` and runs its methods, one call at a time.
 
 A call has a deadline; a worker that overruns it or dies is killed, reaped and replaced. Arguments and results are
-pickled. Workers ignore SIGINT, for the parent ends them; they end by themselves when the parent is gone.
+pickled. A worker ends by itself when the parent is gone. (Not `multiprocessing`: its resource tracker is a process
+that outlives us.)
 """
 
 import asyncio
 import logging
-import multiprocessing
-import signal
+import socket
+import subprocess
+import sys
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from rapp_hop.errors import Bug, Unreachable
 
-_SPAWN = multiprocessing.get_context("spawn")
 _log = logging.getLogger(__name__)
 
 
@@ -25,7 +25,7 @@ class Workers:
     def __init__(self, setup: Callable[[], object], count: int) -> None:
         """Remember what to start.
 
-        :param setup: a function of a module (pickled by name) that makes the object whose methods are called
+        :param setup: a function of an importable module that makes the object whose methods are called
         """
         self._setup = setup
         self._count = count
@@ -95,10 +95,15 @@ class _Worker:
     """One process and the pipe to it."""
 
     def __init__(self, setup: Callable[[], object]) -> None:
-        self._pipe, far = _SPAWN.Pipe()
-        self._process: SpawnProcess = _SPAWN.Process(target=_serve, args=(far, setup), daemon=True, name="hop-worker")
-        self._process.start()
-        far.close()
+        near, far = socket.socketpair()
+        with far:
+            words = [sys.executable, "-m", "rapp_hop.worker", str(far.fileno())]
+            # A session of its own: Ctrl-C at the terminal is for the parent, who ends its workers.
+            self._process = subprocess.Popen(
+                words, pass_fds=[far.fileno()], stdin=subprocess.DEVNULL, stdout=2, start_new_session=True
+            )
+        self._pipe = Connection(near.detach())
+        self._pipe.send((sys.path, setup.__module__, setup.__qualname__))
 
     def call(self, method: str, arguments: tuple[Any, ...]) -> tuple[bool, Any]:
         self._pipe.send((method, arguments))
@@ -106,23 +111,7 @@ class _Worker:
         return found
 
     def end(self) -> None:
+        # A thread that reads sees the end of the pipe as soon as the process is gone; the pipe itself is closed when
+        # nobody holds it any more, never under a reader.
         self._process.kill()
-        self._process.join(5)
-        # The reading thread sees the end of the pipe as soon as the process is gone; only then may it be closed.
-
-
-def _serve(pipe: Connection, setup: Callable[[], object]) -> None:
-    """Run in the worker: set up, then answer calls until the pipe ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    subject = setup()
-    while True:
-        try:
-            method, arguments = pipe.recv()
-        except (EOFError, OSError):
-            return
-        try:
-            answer = (True, getattr(subject, method)(*arguments))
-        except Exception as error:  # noqa: BLE001 (carried to the caller, who knows its type)
-            answer = (False, error)
-        pipe.send(answer)
+        self._process.wait(5)

@@ -51,7 +51,9 @@ def unwilling() -> None:
     raise Refused("cannot do this: ask for something else")
 
 
-def run(test: Callable[[int, HopClient], Awaitable[None]], tmp_path: Path, *more: Service, limits: ServerLimits | None = None) -> None:
+def run(
+    test: Callable[[int, HopClient], Awaitable[None]], tmp_path: Path, *more: Service, limits: ServerLimits | None = None
+) -> None:
     async def main() -> None:
         async with serving(tmp_path, *more, limits=limits) as port:
             client = HopClient(f"http://127.0.0.1:{port}", TOKEN)
@@ -91,8 +93,8 @@ async def raw(port: int, data: bytes) -> bytes:
                 while piece := line.recv(65536):
                     answer += piece
                     head, blank, body = answer.partition(b"\r\n\r\n")
-                    length = next((int(x[15:]) for x in head.split(b"\r\n") if x.lower().startswith(b"content-length:")), None)
-                    if blank and length is not None and len(body) >= length:
+                    lengths = [int(x[15:]) for x in head.split(b"\r\n") if x.lower().startswith(b"content-length:")]
+                    if blank and lengths and len(body) >= lengths[0]:
                         break
             except (TimeoutError, ConnectionError):
                 pass
@@ -102,12 +104,13 @@ async def raw(port: int, data: bytes) -> bytes:
 
 
 def head(length: int | str, *, name: str = "echo", token: str = TOKEN, kind: str = "application/json") -> bytes:
-    return f"POST /hop/{name} HTTP/1.1\r\nHost: x\r\nAccept-Token: {token}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n\r\n".encode()
+    line = f"POST /hop/{name} HTTP/1.1\r\nHost: x\r\nAccept-Token: {token}\r\n"
+    return f"{line}Content-Type: {kind}\r\nContent-Length: {length}\r\n\r\n".encode()
 
 
 def test_call_with_names_defaults_and_any_json(tmp_path: Path) -> None:
     async def test(_: int, client: HopClient) -> None:
-        value = {"text": "żółw\n\"", "list": [1, 2.5, None, True, {"deep": []}]}
+        value = {"text": 'żółw\n"', "list": [1, 2.5, None, True, {"deep": []}]}
         assert await client.call("echo", {"value": value, "times": 2}) == [value, value]
         assert await client.call("who") == "nao application/json"
 
@@ -210,18 +213,21 @@ def test_wrong_token_is_told_before_the_body_comes(tmp_path: Path) -> None:
     run(test, tmp_path)
 
 
+OWN = f"Host: x\r\nAccept-Token: {TOKEN}\r\n"
+
+
 @pytest.mark.parametrize(
     ("request_", "status"),
     [
-        (f"GET /hop/echo HTTP/1.1\r\nHost: x\r\nAccept-Token: {TOKEN}\r\n\r\n", b"405"),
-        (f"DELETE /hop/echo HTTP/1.1\r\nHost: x\r\nAccept-Token: {TOKEN}\r\n\r\n", b"405"),
-        (f"POST /hop/../etc/passwd HTTP/1.1\r\nHost: x\r\nAccept-Token: {TOKEN}\r\nContent-Length: 0\r\n\r\n", b"404"),
+        (f"GET /hop/echo HTTP/1.1\r\n{OWN}\r\n", b"405"),
+        (f"DELETE /hop/echo HTTP/1.1\r\n{OWN}\r\n", b"405"),
+        (f"POST /hop/../etc/passwd HTTP/1.1\r\n{OWN}Content-Length: 0\r\n\r\n", b"404"),
         ("GET / HTTP/1.1\r\nHost: x\r\n\r\n", b"404"),
-        (f"POST /hop/echo HTTP/1.1\r\nHost: x\r\nAccept-Token: {TOKEN}\r\nContent-Type: text/plain\r\nContent-Length: 2\r\n\r\n{{}}", b"400"),
+        (f"POST /hop/echo HTTP/1.1\r\n{OWN}Content-Type: text/plain\r\nContent-Length: 2\r\n\r\n{{}}", b"400"),
         ("POST /hop/echo HTTP/1.1\r\nHost: x\r\nContent-Length: +5\r\n\r\n", b"40"),
         ("POST /hop/echo HTTP/1.1\r\nHost: x\r\nX: " + "y" * 70_000 + "\r\n\r\n", b"4"),
     ],
-)  # fmt: skip
+)
 def test_h02_to_h11_requests_out_of_rule(tmp_path: Path, request_: str, status: bytes) -> None:
     async def test(port: int, client: HopClient) -> None:
         answer = await raw(port, request_.encode())
@@ -410,7 +416,7 @@ def test_a_download_tells_its_progress_and_a_full_disk(tmp_path: Path) -> None:
             assert await client.download("/x", tmp_path / "x", 5, on_progress=lambda *all_: told.append(all_)) == 5
             assert (tmp_path / "x").read_bytes() == b"hello"
             assert told[-1] == (5, 5)
-            with open("/dev/full", "wb", buffering=0) as full, pytest.raises(OSError, match="No space"):
+            with Path("/dev/full").open("wb", buffering=0) as full, pytest.raises(OSError, match="No space"):
                 await client.download("/x", full.write, 5)
 
     asyncio.run(main())

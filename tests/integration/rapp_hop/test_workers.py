@@ -1,45 +1,30 @@
 """Worker processes: real ones, that hang, die, and are reaped."""
 
 import asyncio
-import multiprocessing
 import os
-import signal
-import time
 
 import pytest
 
+from fakes.subject import Subject
 from rapp_hop.errors import Bug, Unreachable
 from rapp_hop.workers import Workers
 
 
-class Subject:
-    """What a worker holds."""
-
-    def __init__(self) -> None:
-        self._calls = 0
-
-    def count(self) -> tuple[int, int]:
-        self._calls += 1
-        return self._calls, os.getpid()
-
-    def fail(self, text: str) -> None:
-        raise ValueError(text)
-
-    def hang(self) -> None:
-        time.sleep(600)
-
-    def die(self) -> None:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
+def assert_gone(*pids: int) -> None:
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
 
 
 def test_a_worker_keeps_its_object_and_errors_come_back() -> None:
+    seen: list[int] = []
+
     async def main() -> None:
         workers = Workers(Subject, 1)
         await workers.start()
         try:
             first, process = await workers.run("count", timeout=30)
+            seen.append(process)
             assert process != os.getpid()
             with pytest.raises(ValueError, match="so it is"):
                 await workers.run("fail", "so it is", timeout=30)
@@ -48,10 +33,12 @@ def test_a_worker_keeps_its_object_and_errors_come_back() -> None:
             await workers.close()
 
     asyncio.run(main())
-    assert multiprocessing.active_children() == []
+    assert_gone(*seen)
 
 
 def test_a_worker_that_hangs_or_dies_is_replaced() -> None:
+    seen: list[int] = []
+
     async def main() -> None:
         workers = Workers(Subject, 1)
         await workers.start()
@@ -64,17 +51,18 @@ def test_a_worker_that_hangs_or_dies_is_replaced() -> None:
                 await workers.run("die", timeout=30)
             _, third = await workers.run("count", timeout=30)
             assert len({first, second, third}) == 3
-            for gone in (first, second):
-                with pytest.raises(ProcessLookupError):
-                    os.kill(gone, 0)
+            assert_gone(first, second)
+            seen.append(third)
         finally:
             await workers.close()
 
     asyncio.run(main())
-    assert multiprocessing.active_children() == []
+    assert_gone(*seen)
 
 
 def test_a_hanging_worker_does_not_hold_up_the_other() -> None:
+    seen: list[int] = []
+
     async def main() -> None:
         workers = Workers(Subject, 2)
         await workers.start()
@@ -82,7 +70,9 @@ def test_a_hanging_worker_does_not_hold_up_the_other() -> None:
             hanging = asyncio.create_task(workers.run("hang", timeout=60))
             await asyncio.sleep(0)
             for expected in range(1, 4):
-                assert (await workers.run("count", timeout=30))[0] == expected
+                count, process = await workers.run("count", timeout=30)
+                seen.append(process)
+                assert count == expected
             assert not hanging.done()
             hanging.cancel()
             with pytest.raises(asyncio.CancelledError):
@@ -91,4 +81,4 @@ def test_a_hanging_worker_does_not_hold_up_the_other() -> None:
             await workers.close()
 
     asyncio.run(main())
-    assert multiprocessing.active_children() == []
+    assert_gone(*seen)

@@ -4,7 +4,6 @@ import json
 from typing import Any
 
 from fakes.packages import manifest
-
 from rapp_cloud.catalogue import RobotKind, catalogue, commands
 from rapp_hop.hz.manifest import Manifest, parse_manifest
 
@@ -52,6 +51,11 @@ def test_cloud_agents_are_no_rapps_of_their_own() -> None:
 
 
 def test_commands_are_the_sentences_of_what_the_robot_can_run() -> None:
-    shelf = [rapp(), rapp("other", needs={"robot": ["turtle"]}), rapp("mute", sentences={}), rapp("polski", sentences={"pl": ["cześć"]})]
+    shelf = [
+        rapp(),
+        rapp("other", needs={"robot": ["turtle"]}),
+        rapp("mute", sentences={}),
+        rapp("polski", sentences={"pl": ["cześć"]}),
+    ]
     assert commands(catalogue(shelf, NAO), "en") == {"hello": ("say hello to me",)}
     assert commands(catalogue(shelf, NAO), "pl") == {"polski": ("cześć",)}

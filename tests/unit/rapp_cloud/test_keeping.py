@@ -41,7 +41,9 @@ def test_a_token_taken_away_counts_no_more(tmp_path: Path) -> None:
     assert accounts.robot_of(token) is None
 
 
-@pytest.mark.parametrize("text", ["[]", '{"short": "nao"}', '{"xxxxxxxxxxxxxxxxxxxx": 3}', '{"xxxxxxxxxxxxxxxxxxxx": "../x"}', "{"])
+@pytest.mark.parametrize(
+    "text", ["[]", '{"short": "nao"}', '{"xxxxxxxxxxxxxxxxxxxx": 3}', '{"xxxxxxxxxxxxxxxxxxxx": "../x"}', "{"]
+)
 def test_broken_token_files(tmp_path: Path, text: str) -> None:
     (tmp_path / "tokens.json").write_text(text)
     with pytest.raises(Invalid):
@@ -60,7 +62,9 @@ def test_profiles_come_back(tmp_path: Path) -> None:
         profiles.get("../nao")
 
 
-@pytest.mark.parametrize("address", ["", "m", "@x", "m@", "a@b@c", "m@x\nBcc: all@x", "m@x, n@x", "<m@x>", '"m"@x', "m @x", "m@x y"])
+@pytest.mark.parametrize(
+    "address", ["", "m", "@x", "m@", "a@b@c", "m@x\nBcc: all@x", "m@x, n@x", "<m@x>", '"m"@x', "m @x", "m@x y"]
+)
 def test_h19_addresses_that_are_none(address: str) -> None:
     with pytest.raises(Invalid, match="not a mail address"):
         parse_profile({"name": "M", "language": "en", "contacts": [{"name": "x", "address": address}]})

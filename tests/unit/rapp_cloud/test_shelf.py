@@ -1,13 +1,12 @@
 """The shelf signs what a robot will believe, and never two things under one name."""
 
-import os
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from fakes.packages import source_folder
 from tuf.api.metadata import Metadata
 
+from fakes.packages import source_folder
 from rapp_cloud.shelf import Expiry, Shelf
 from rapp_hop.errors import Bug, Invalid, Refused
 from rapp_hop.hz.archive import build
@@ -130,7 +129,7 @@ def test_create_twice_keeps_the_keys(shelf: Shelf, tmp_path: Path) -> None:
 
 
 def test_keys_that_others_can_read_are_not_used(shelf: Shelf, tmp_path: Path) -> None:
-    os.chmod(tmp_path / "keys" / "targets.pem", 0o644)
+    (tmp_path / "keys" / "targets.pem").chmod(0o644)
     with pytest.raises(Refused, match="0600"):
         shelf.refresh()
 

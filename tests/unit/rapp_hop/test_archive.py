@@ -10,8 +10,8 @@ import zlib
 from pathlib import Path
 
 import pytest
-from fakes.packages import file_member, folder_member, manifest, packed, right_members, source_folder, tar_bytes
 
+from fakes.packages import file_member, folder_member, manifest, packed, right_members, source_folder, tar_bytes
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.archive import build, extract, inspect
 from rapp_hop.hz.tar import Limits

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from fakes.packages import source_folder
 
+from fakes.packages import source_folder
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.archive import build
 from rapp_hop.hz.install import PackageFile, RappFolder, install

@@ -15,7 +15,9 @@ def post(body: bytes, kind: str = "application/json", method: str = "POST") -> W
 
 
 def multipart(*parts: tuple[str, bytes]) -> WireRequest:
-    body = b"".join(b"--B\r\nContent-Disposition: form-data; " + head.encode() + b"\r\n\r\n" + data + b"\r\n" for head, data in parts)
+    body = b"".join(
+        b"--B\r\nContent-Disposition: form-data; " + head.encode() + b"\r\n\r\n" + data + b"\r\n" for head, data in parts
+    )
     return post(body + b"--B--\r\n", "multipart/form-data; boundary=B")
 
 
@@ -44,7 +46,20 @@ def test_of_a_file_name_only_a_plain_suffix_is_kept(name: str) -> None:
 
 @pytest.mark.parametrize(
     "body",
-    [b"{", b"[]", b'"x"', b"1", b"null", b'{"a":1}{"b":2}', b'{"a":1,"a":2}', b'{"a":NaN}', b'{"a":1e400}', b"\xff", b"[" * 99999, b'{"a":"\\udc00"}'],
+    [
+        b"{",
+        b"[]",
+        b'"x"',
+        b"1",
+        b"null",
+        b'{"a":1}{"b":2}',
+        b'{"a":1,"a":2}',
+        b'{"a":NaN}',
+        b'{"a":1e400}',
+        b"\xff",
+        b"[" * 99999,
+        b'{"a":"\\udc00"}',
+    ],
 )
 def test_h12_bad_json(body: bytes) -> None:
     with pytest.raises(Invalid, match="cannot read"):
@@ -52,7 +67,14 @@ def test_h12_bad_json(body: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    "request_", [post(b"{}", method="GET"), post(b"{}", method="DELETE"), post(b"{}", "text/plain"), post(b"{}", ""), post(b"{}", "application/jsonp")]
+    "request_",
+    [
+        post(b"{}", method="GET"),
+        post(b"{}", method="DELETE"),
+        post(b"{}", "text/plain"),
+        post(b"{}", ""),
+        post(b"{}", "application/jsonp"),
+    ],
 )
 def test_h11_wrong_method_or_type(request_: WireRequest) -> None:
     with pytest.raises(Invalid, match="POST application/json"):
@@ -112,7 +134,14 @@ def test_results_that_json_has_not(value: Any) -> None:
 
 @pytest.mark.parametrize(
     ("error", "status"),
-    [(Refused("cannot x"), 403), (Invalid("cannot x"), 400), (Unreachable("cannot x"), 503), (Bug("cannot x"), 500), (Refused("cannot x", 404), 404), (Refused("cannot x", 299), 403)],
+    [
+        (Refused("cannot x"), 403),
+        (Invalid("cannot x"), 400),
+        (Unreachable("cannot x"), 503),
+        (Bug("cannot x"), 500),
+        (Refused("cannot x", 404), 404),
+        (Refused("cannot x", 299), 403),
+    ],
 )
 def test_errors_travel_and_come_back_as_themselves(error: HopError, status: int) -> None:
     answer = JSON_FORM.write_error(error)

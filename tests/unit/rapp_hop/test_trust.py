@@ -4,9 +4,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from fakes.repository import URL, Repository
 from securesystemslib.signer import CryptoSigner
 
+from fakes.repository import URL, Repository
 from rapp_hop.errors import Invalid, Refused, Unreachable
 from rapp_hop.hz.tar import Limits
 from rapp_hop.hz.trust import Attack, TrustedStore, Untrusted, newest

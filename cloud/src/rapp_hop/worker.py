@@ -1,0 +1,33 @@
+"""One worker process, as `workers` starts it: `python -m rapp_hop.worker FD`, an inherited end of a socket pair.
+
+First comes (import path, module, function): the function makes the object. Then come (method, arguments), and
+(true, result) or (false, exception) go back, until the other end is gone.
+"""
+
+import importlib
+import signal
+import sys
+from multiprocessing.connection import Connection
+
+
+def main() -> None:
+    """Serve until the pipe ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends its workers
+    pipe = Connection(int(sys.argv[1]))
+    try:
+        path, module, function = pipe.recv()
+        sys.path[:] = path
+        subject = getattr(importlib.import_module(module), function)()
+        while True:
+            method, arguments = pipe.recv()
+            try:
+                answer = (True, getattr(subject, method)(*arguments))
+            except Exception as error:  # noqa: BLE001 (carried to the caller, who knows its type)
+                answer = (False, error)
+            pipe.send(answer)
+    except (EOFError, ConnectionError):
+        return
+
+
+if __name__ == "__main__":
+    main()
