@@ -1,4 +1,4 @@
-"""What the ROS side knows of a connected client: a way to send to it that never blocks."""
+"""What the ROS side knows of a connected client: ways to send to it that never block."""
 
 from typing import Protocol
 
@@ -6,8 +6,8 @@ from typing import Protocol
 class Client(Protocol):
     """A connected client; all methods may be called from any thread."""
 
-    def send(self, text: str) -> None:
+    def send(self, frame: bytes) -> None:
         """Queue an answer or a request; a client that lets too many wait is disconnected."""
 
-    def offer(self, topic: str, text: str, queue_length: int) -> None:
+    def offer(self, topic: str, frame: bytes, queue_length: int) -> None:
         """Queue a topic's message; the oldest of that topic is dropped when `queue_length` of it wait already."""

@@ -10,8 +10,12 @@ class Invalid(BridgeError):  # noqa: N818 - the four names are the project's wor
 
 
 class Refused(BridgeError):  # noqa: N818
-    """A limit or a rule of the bridge forbids it: do less, or ask for something else."""
+    """A limit or a rule of the bridge, or the called service, forbids it: do less, or ask for something else."""
 
 
 class Unreachable(BridgeError):  # noqa: N818
     """The other side is not there or does not answer: try later."""
+
+
+class Bug(BridgeError):  # noqa: N818
+    """The bridge itself is wrong: report it."""

@@ -4,6 +4,7 @@ Operations and field types as in ROSBRIDGE_PROTOCOL.md of rosbridge_suite (branc
 """
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,9 @@ import orjson
 from rapp_bridge.errors import Invalid
 
 Id = str | int | None
+
+_NAME = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*")  # wiki.ros.org/Names
+TEXT_LIMIT = 500  # characters of an error's text
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,7 @@ def decode(fields: dict[str, Any]) -> Message:
     op = reader.text("op")
     decoder = _DECODERS.get(op)
     if decoder is None:
-        raise Invalid(f"cannot serve op {op!r}: this bridge knows {', '.join(sorted(_DECODERS))}")
+        raise Invalid(f"cannot serve op {op[:100]!r}: this bridge knows {', '.join(sorted(_DECODERS))}")
     return decoder(reader)
 
 
@@ -131,7 +135,8 @@ class _Reader:
         self._fields = fields
 
     def _get(self, name: str, kinds: tuple[type, ...], default: Any) -> Any:
-        value = self._fields.get(name, default)
+        value = self._fields.get(name)
+        value = default if value is None else value
         if value is ...:
             raise Invalid(f"cannot serve the message: field {name} is missing")
         is_flag = isinstance(value, bool)
@@ -144,6 +149,12 @@ class _Reader:
         value: str = self._get(name, (str,), ...)
         if not value:
             raise Invalid(f"cannot serve the message: field {name} is empty")
+        return value
+
+    def name(self, field: str) -> str:
+        value = self.text(field)
+        if not _NAME.fullmatch(value):
+            raise Invalid(f"cannot serve the message: {field} {value[:100]!r} is no ROS name")
         return value
 
     def optional_text(self, name: str) -> str | None:
@@ -182,34 +193,34 @@ class _Reader:
 
 _DECODERS: dict[str, Callable[[_Reader], Message]] = {
     "advertise": lambda r: Advertise(
-        r.text("topic"), r.text("type"), r.id(), r.flag("latch", False), r.count("queue_size", 100)
+        r.name("topic"), r.text("type"), r.id(), r.flag("latch", False), r.count("queue_size", 100)
     ),
-    "unadvertise": lambda r: Unadvertise(r.text("topic"), r.id()),
-    "publish": lambda r: Publish(r.text("topic"), r.object("msg"), r.id()),
+    "unadvertise": lambda r: Unadvertise(r.name("topic"), r.id()),
+    "publish": lambda r: Publish(r.name("topic"), r.object("msg"), r.id()),
     "subscribe": lambda r: Subscribe(
-        r.text("topic"), r.optional_text("type"), r.id(), r.count("throttle_rate", 0), r.count("queue_length", 0)
+        r.name("topic"), r.optional_text("type"), r.id(), r.count("throttle_rate", 0), r.count("queue_length", 0)
     ),
-    "unsubscribe": lambda r: Unsubscribe(r.text("topic"), r.id()),
-    "call_service": lambda r: CallService(r.text("service"), r.arguments(), r.id(), r.seconds("timeout")),
-    "advertise_service": lambda r: AdvertiseService(r.text("service"), r.text("type")),
-    "unadvertise_service": lambda r: UnadvertiseService(r.text("service")),
-    "service_response": lambda r: ServiceResponse(r.text("service"), str(r.id()), r.flag("result"), r.any("values")),
+    "unsubscribe": lambda r: Unsubscribe(r.name("topic"), r.id()),
+    "call_service": lambda r: CallService(r.name("service"), r.arguments(), r.id(), r.seconds("timeout")),
+    "advertise_service": lambda r: AdvertiseService(r.name("service"), r.text("type")),
+    "unadvertise_service": lambda r: UnadvertiseService(r.name("service")),
+    "service_response": lambda r: ServiceResponse(r.name("service"), r.text("id"), r.flag("result"), r.any("values")),
 }
 
 
-def _encode(fields: dict[str, Any]) -> str:
+def _encode(fields: dict[str, Any]) -> bytes:
     try:
-        return orjson.dumps(fields).decode()
-    except TypeError:
-        return json.dumps(fields)  # integers beyond 64 bits, which orjson refuses
+        return orjson.dumps(fields)
+    except TypeError:  # a ROS string that is no UTF-8, which the escapes of the standard library can carry
+        return json.dumps(fields).encode()
 
 
-def publication(topic: str, msg: Any) -> str:
+def publication(topic: str, msg: Any) -> bytes:
     """A topic's message for a client."""
     return _encode({"op": "publish", "topic": topic, "msg": msg})
 
 
-def service_result(call: CallService, values: Any, result: bool) -> str:
+def service_result(call: CallService, values: Any, result: bool) -> bytes:
     """The answer to a client's call: `values` are the response's fields, or the error's text when `result` is false."""
     fields = {"op": "service_response", "service": call.service, "values": values, "result": result}
     if call.id is not None:
@@ -217,14 +228,14 @@ def service_result(call: CallService, values: Any, result: bool) -> str:
     return _encode(fields)
 
 
-def service_request(service: str, request: str, args: Any) -> str:
+def service_request(service: str, request: str, args: Any) -> bytes:
     """A call for the client that advertised `service`; `request` is the id its answer must carry."""
     return _encode({"op": "call_service", "id": request, "service": service, "args": args})
 
 
-def error_status(text: str, message_id: Id = None) -> str:
-    """A status of level error (protocol section 3.2.2)."""
-    fields: dict[str, Any] = {"op": "status", "level": "error", "msg": text}
+def error_status(text: str, message_id: Id = None) -> bytes:
+    """A status of level error (protocol section 3.2.2); a long text is cut, so that no client gets its own frame back."""
+    fields: dict[str, Any] = {"op": "status", "level": "error", "msg": text[:TEXT_LIMIT]}
     if message_id is not None:
         fields["id"] = message_id
     return _encode(fields)

@@ -2,25 +2,59 @@
 
 import threading
 import time
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import rospy
-import rostopic
 
 from rapp_bridge.client import Client
+from rapp_bridge.config import Config
 from rapp_bridge.conversion import from_json, message_class, writer
-from rapp_bridge.errors import Invalid
+from rapp_bridge.errors import Invalid, Unreachable
+from rapp_bridge.master import Master
 from rapp_bridge.protocol import Advertise, Publish, Subscribe, Unadvertise, Unsubscribe, publication
 
-DEFAULT_QUEUE = 100  # messages of one topic that may wait for one client
+DEFAULT_QUEUE = 100  # messages of one topic that may wait for one client, when it names no queue_length
+OPENING = 1.0  # s after the first advertisement in which messages are kept for subscribers that are still connecting
+
+
+class _Opening(rospy.SubscribeListener):  # type: ignore[misc]
+    """Gives a new subscriber what was published just before it had connected: a client may publish right after advertise."""
+
+    def __init__(self, kept: int) -> None:
+        self._until = time.monotonic() + OPENING
+        self._recent: deque[Any] = deque(maxlen=kept)
+        self._lock = threading.Lock()
+
+    def publish(self, publisher: Any, message: Any) -> None:
+        """Publish, and keep the message while the topic opens."""
+        if time.monotonic() > self._until:
+            publisher.publish(message)
+            return
+        with self._lock:
+            self._recent.append(message)
+            publisher.publish(message)
+
+    def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
+        """Called by rospy for each new subscriber."""
+        if time.monotonic() <= self._until:
+            with self._lock:
+                for message in self._recent:
+                    peer_publish(message)
 
 
 @dataclass
 class _Published:
     publisher: Any
     type: str
+    opening: _Opening | None
     clients: set[Client] = field(default_factory=set)
+    unused_since: float = 0.0
+
+    def suits(self, wish: Advertise) -> bool:
+        return wish.type in ("", self.type) and wish.latch == (self.opening is None)
 
 
 @dataclass
@@ -29,148 +63,158 @@ class _Wish:
 
     throttle: float  # s between messages
     queue_length: int
-    ids: set[str | int | None]
     last: float = float("-inf")
 
+    def is_due(self, now: float) -> bool:
+        if now - self.last < self.throttle:
+            return False
+        self.last = now
+        return True
 
-@dataclass
+
 class _Subscribed:
-    subscriber: Any
-    type: str
-    wishes: dict[Client, _Wish] = field(default_factory=dict)
+    """A rospy subscriber and the clients behind it; `wishes` is replaced as a whole, so deliveries need no lock."""
+
+    def __init__(self, topic: str, type_name: str, cls: Any) -> None:
+        self.type = type_name
+        self.wishes: dict[Client, _Wish] = {}
+        self._topic = topic
+        self._encode = writer(cls)
+        self.subscriber: Any = None
+
+    def deliver(self, message: Any) -> None:
+        """One ROS message to all clients that want it now; encoded once for all."""
+        now = time.monotonic()
+        due = [(client, wish) for client, wish in self.wishes.items() if wish.is_due(now)]
+        if due:
+            frame = publication(self._topic, self._encode(message))
+            for client, wish in due:
+                client.offer(self._topic, frame, wish.queue_length)
+
+    def replay(self, message: Any, client: Client) -> None:
+        """A latched message to one client that came late."""
+        wish = self.wishes.get(client)
+        if wish is not None:
+            client.offer(self._topic, publication(self._topic, self._encode(message)), wish.queue_length)
 
 
 class Topics:
-    """All topics the clients publish and subscribe."""
+    """All topics the clients publish and subscribe, by the name as the client wrote it.
 
-    def __init__(self) -> None:
-        self._lock = threading.RLock()
+    `publish` and `advertised` do not block; all other methods ask the master and do. Any thread may call them.
+    """
+
+    def __init__(self, config: Config, master: Master) -> None:
+        self._linger = config.linger
+        self._master = master
+        self._change = threading.Lock()
         self._published: dict[str, _Published] = {}
         self._subscribed: dict[str, _Subscribed] = {}
 
+    def advertised(self, client: Client, topic: str) -> bool:
+        """Whether the client is among the topic's publishers."""
+        entry = self._published.get(topic)
+        return entry is not None and client in entry.clients
+
     def advertise(self, client: Client, wish: Advertise) -> None:
-        """Register the topic's publisher, or join it; raises Invalid when its type is another one."""
-        with self._lock:
+        """Register the topic's publisher, or join it; without a type the master's is taken. Raises BridgeError."""
+        with self._change:
             entry = self._published.get(wish.topic)
+            if entry is not None and not entry.clients and not entry.suits(wish):
+                self._close_publisher(wish.topic)
+                entry = None
             if entry is None:
-                cls = message_class(wish.type)
-                publisher = rospy.Publisher(wish.topic, cls, latch=wish.latch, queue_size=max(1, wish.queue_size))
-                entry = self._published[wish.topic] = _Published(publisher, wish.type)
-            elif entry.type != wish.type:
-                raise Invalid(f"cannot advertise {wish.topic} as {wish.type}: it is {entry.type}")
+                entry = self._published[wish.topic] = self._open_publisher(wish)
+            elif wish.type not in ("", entry.type):
+                raise Invalid(f"cannot advertise {wish.topic} as {wish.type}: it is {entry.type}; use that type")
             entry.clients.add(client)
 
-    def unadvertise(self, client: Client, wish: Unadvertise) -> None:
-        """Leave the topic's publisher, which is unregistered when nobody is left."""
-        with self._lock:
-            entry = self._published.get(wish.topic)
-            if entry is None or client not in entry.clients:
-                raise Invalid(f"cannot unadvertise {wish.topic}: this client does not advertise it")
-            self._leave_publisher(client, wish.topic)
-
-    def publish(self, client: Client, wish: Publish) -> None:
-        """Publish one message, advertising the topic first when its type is known to the master."""
-        with self._lock:
-            entry = self._published.get(wish.topic)
-            if entry is None or client not in entry.clients:
-                self.advertise(client, Advertise(wish.topic, _known_type(wish.topic)))
-                entry = self._published[wish.topic]
-        message = from_json(wish.msg, entry.type, entry.publisher.data_class)
+    def _open_publisher(self, wish: Advertise) -> _Published:
+        type_name = self._type(wish.topic, wish.type)
+        cls = message_class(type_name)
+        size = max(1, wish.queue_size)
+        opening = None if wish.latch else _Opening(size)
         try:
-            entry.publisher.publish(message)
+            publisher = rospy.Publisher(wish.topic, cls, opening, latch=wish.latch, queue_size=size)
+        except (rospy.ROSException, OSError, ValueError) as error:
+            raise Unreachable(f"cannot advertise {wish.topic}: {error}") from error
+        return _Published(publisher, type_name, opening)
+
+    def unadvertise(self, client: Client, wish: Unadvertise) -> None:
+        """Leave the topic's publisher, if there; without clients it lives on for a while, see `sweep`."""
+        with self._change:
+            entry = self._published.get(wish.topic)
+            if entry is not None and client in entry.clients:
+                entry.clients.discard(client)
+                entry.unused_since = time.monotonic()
+
+    def sweep(self) -> None:
+        """Unregister the publishers that no client has used for a while; to be called now and then."""
+        with self._change:
+            old = time.monotonic() - self._linger
+            for topic in [t for t, e in self._published.items() if not e.clients and e.unused_since < old]:
+                self._close_publisher(topic)
+
+    def publish(self, wish: Publish) -> None:
+        """Publish one message on an advertised topic; raises Invalid when it does not fit."""
+        entry = self._published.get(wish.topic)
+        if entry is None:
+            raise Invalid(f"cannot publish on {wish.topic}: it is not advertised; advertise it first")
+        message = from_json(wish.msg, entry.publisher.data_class)
+        try:
+            if entry.opening is None:
+                entry.publisher.publish(message)
+            else:
+                entry.opening.publish(entry.publisher, message)
         except rospy.ROSException as error:
             raise Invalid(f"cannot publish on {wish.topic}: {error}") from error
 
     def subscribe(self, client: Client, wish: Subscribe) -> None:
-        """Subscribe to the topic, or join it; latched messages are replayed to a joining client."""
-        with self._lock:
+        """Subscribe to the topic, join it (and get what is latched), or change the client's wish. Raises BridgeError."""
+        with self._change:
             entry = self._subscribed.get(wish.topic)
-            late = entry is not None and client not in entry.wishes
+            if entry is not None and wish.type not in (None, entry.type):
+                raise Invalid(f"cannot subscribe to {wish.topic} as {wish.type}: it is {entry.type}; use that type")
+            new = _Wish(wish.throttle_rate / 1000, wish.queue_length or DEFAULT_QUEUE)
             if entry is None:
-                entry = self._open(wish)
-            elif wish.type not in (None, entry.type):
-                raise Invalid(f"cannot subscribe to {wish.topic} as {wish.type}: it is {entry.type}")
-            old = entry.wishes.get(client)
-            ids = {wish.id} | (old.ids if old else set())
-            throttle = wish.throttle_rate / 1000
-            if old is not None:
-                throttle = min(throttle, old.throttle)
-            entry.wishes[client] = _Wish(throttle, wish.queue_length or DEFAULT_QUEUE, ids)
-        if late:
-            entry.subscriber.impl.add_callback(self._deliver_to, (wish.topic, client))
-            entry.subscriber.impl.remove_callback(self._deliver_to, (wish.topic, client))
+                self._open_subscriber(client, wish, new)
+                return
+            late = client not in entry.wishes
+            entry.wishes = {**entry.wishes, client: new}
+            if late:  # rospy gives a callback that is added late the latched messages
+                entry.subscriber.impl.add_callback(entry.replay, client)
+                entry.subscriber.impl.remove_callback(entry.replay, client)
 
-    def _open(self, wish: Subscribe) -> _Subscribed:
-        type_name = wish.type or _known_type(wish.topic)
+    def _open_subscriber(self, client: Client, wish: Subscribe, first: _Wish) -> None:
+        type_name = self._type(wish.topic, wish.type)
         cls = message_class(type_name)
-        entry = _Subscribed(None, type_name)
+        entry = _Subscribed(wish.topic, type_name, cls)
+        entry.wishes = {client: first}
+        try:
+            entry.subscriber = rospy.Subscriber(wish.topic, cls, entry.deliver, tcp_nodelay=True)
+        except (rospy.ROSException, OSError, ValueError) as error:
+            raise Unreachable(f"cannot subscribe to {wish.topic}: {error}") from error
         self._subscribed[wish.topic] = entry
-        encode = writer(cls)
-
-        def deliver(message: Any) -> None:
-            self._deliver(wish.topic, publication(wish.topic, encode(message)))
-
-        entry.subscriber = rospy.Subscriber(wish.topic, cls, deliver, tcp_nodelay=True)
-        return entry
 
     def unsubscribe(self, client: Client, wish: Unsubscribe) -> None:
-        """Give up one subscription (with an id) or all of them (without); the last one closes the subscriber."""
-        with self._lock:
+        """Take the client off the topic, if there; without clients the subscriber is closed."""
+        with self._change:
             entry = self._subscribed.get(wish.topic)
-            if entry is None or client not in entry.wishes:
-                raise Invalid(f"cannot unsubscribe from {wish.topic}: this client is not subscribed")
-            ids = entry.wishes[client].ids
-            if wish.id is not None:
-                ids.discard(wish.id)
-            if wish.id is None or not ids:
-                self._leave_subscriber(client, wish.topic)
+            if entry is None:
+                return
+            entry.wishes = {other: kept for other, kept in entry.wishes.items() if other is not client}
+            if not entry.wishes:
+                del self._subscribed[wish.topic]
+                entry.subscriber.unregister()
 
-    def forget(self, client: Client) -> None:
-        """Undo all that a client has advertised and subscribed."""
-        with self._lock:
-            for topic in [t for t, e in self._published.items() if client in e.clients]:
-                self._leave_publisher(client, topic)
-            for topic in [t for t, e in self._subscribed.items() if client in e.wishes]:
-                self._leave_subscriber(client, topic)
+    def _close_publisher(self, topic: str) -> None:
+        self._published.pop(topic).publisher.unregister()
 
-    def _leave_publisher(self, client: Client, topic: str) -> None:
-        entry = self._published[topic]
-        entry.clients.discard(client)
-        if not entry.clients:
-            del self._published[topic]
-            entry.publisher.unregister()
-
-    def _leave_subscriber(self, client: Client, topic: str) -> None:
-        entry = self._subscribed[topic]
-        del entry.wishes[client]
-        if not entry.wishes:
-            del self._subscribed[topic]
-            entry.subscriber.unregister()
-
-    def _deliver_to(self, message: Any, target: tuple[str, Client]) -> None:
-        """Replay of a latched message, which rospy gives to a callback that is added late."""
-        topic, client = target
-        with self._lock:
-            entry = self._subscribed.get(topic)
-            wish = entry.wishes.get(client) if entry else None
-        if wish is not None:
-            client.offer(topic, publication(topic, writer(message.__class__)(message)), wish.queue_length)
-
-    def _deliver(self, topic: str, text: str) -> None:
-        now = time.monotonic()
-        with self._lock:
-            entry = self._subscribed.get(topic)
-            wishes = list(entry.wishes.items()) if entry else []
-            due = [(client, wish) for client, wish in wishes if now - wish.last >= wish.throttle]
-            for _, wish in due:
-                wish.last = now
-        for client, wish in due:
-            client.offer(topic, text, wish.queue_length)
-
-
-def _known_type(topic: str) -> str:
-    name = rospy.resolve_name(topic)
-    type_name, _, _ = rostopic.get_topic_type(name)
-    if type_name is None:
-        raise Invalid(f"cannot use topic {topic} without a type: nobody publishes or subscribes it; give its type")
-    return str(type_name)
+    def _type(self, topic: str, wanted: str | None) -> str:
+        """The topic's type; a wanted one must be that which the master knows, if it knows one."""
+        known = self._master.topic_type(rospy.resolve_name(topic))
+        if known is None and not wanted:
+            raise Invalid(f"cannot use topic {topic} without a type: nobody publishes or subscribes it; give its type")
+        if known is not None and wanted and known != wanted:
+            raise Invalid(f"cannot use topic {topic} as {wanted}: it is {known}; use that type")
+        return str(wanted or known)
