@@ -113,6 +113,7 @@ def test_without_stiffness_a_robot_on_bent_knees_sinks(world: WorldClient) -> No
 
 
 def test_a_hard_push_throws_the_robot_over_and_it_gets_up(world: WorldClient) -> None:
+    time.sleep(1.0)  # nothing happens for so long that the physics rests
     world.push([60.0, 0.0, 0.0], 0.2)
     until(world.fallen)
     assert world.posture()[1].startswith("Lying")

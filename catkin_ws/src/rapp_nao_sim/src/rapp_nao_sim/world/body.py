@@ -13,6 +13,7 @@ Quaternion = tuple[float, float, float, float]
 
 _GAIN = 0.3  # of pybullet's position motors; .1 to .6 stand alike
 _GEARS = 0.15  # share of its torque that the friction of a joint's gears holds without stiffness
+_REST = 0.002  # m/s
 _CLEARANCE = 0.0005  # m above the floor when the body is put down
 
 
@@ -81,6 +82,11 @@ class Body:
         """vx, vy (m/s) and turning (rad/s) of the torso in the world."""
         (x, y, _), (_, _, turn) = self._bullet.getBaseVelocity(self._robot)
         return (float(x), float(y), float(turn))
+
+    def still(self) -> bool:
+        """Whether the torso rests, as good as the solver's noise lets one see."""
+        linear, angular = self._bullet.getBaseVelocity(self._robot)
+        return math.hypot(*linear) < _REST and math.hypot(*angular) < 5 * _REST
 
     def feet(self) -> tuple[float, float]:
         """Middle of the soles."""

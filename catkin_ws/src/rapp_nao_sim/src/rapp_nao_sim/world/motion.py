@@ -48,6 +48,7 @@ class Motion:
         self._jobs: dict[int, set[str]] = {}
         self._change: _Change | None = None
         self._moved = True
+        self.quiet = False  # nothing was commanded, and no limp joint gave way, in the last tick
         self.targets = body.angles()
         self.stiffness = dict.fromkeys(BODY, 1.0)
 
@@ -68,6 +69,7 @@ class Motion:
         if self._change is not None and self._now >= self._change.end + _SETTLE:
             self._finish(self._change)
         self._slip()
+        self.quiet = not self._moved and not self.moving()
         if self._moved:
             self._body.drive(self.targets, self.stiffness)
             self._moved = False

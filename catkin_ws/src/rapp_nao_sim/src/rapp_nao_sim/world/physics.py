@@ -22,6 +22,7 @@ from rapp_nao_sim.world.worker import WAIT, Service, serve
 STEP = 1 / 240  # s of one step of the physics
 STEPS = 3  # per tick
 TICK = STEP * STEPS
+ASLEEP = 160  # ticks without any change, after which the physics rests until something happens
 LATEST = 0.25  # s behind the clock, after which lost time is given up
 FALLEN = 0.8  # rad the torso leans more than in any posture on feet or seat
 LONGEST_PUSH = 60.0  # s
@@ -35,6 +36,7 @@ class Physics:
     def __init__(self, service: Service) -> None:
         self._service = service
         self._bullet = connect()
+        self._still = 0  # ticks since anything happened
         self._pushes: list[tuple[tuple[float, float, float], float]] = []
         service.offer({"set_up": self._set_up})
 
@@ -110,6 +112,10 @@ class Physics:
 
     def _tick(self) -> None:
         if not self._motion.tick(TICK):
+            self._still = 0
+            return
+        self._still = self._still + 1 if self._motion.quiet and not self._pushes and self._body.still() else 0
+        if self._still > ASLEEP:
             return
         for _ in range(STEPS):
             for force, _ in self._pushes:
@@ -133,6 +139,7 @@ class Physics:
             raise Refused("cannot turn the door: its opening angle is at most pi to each side")
         self._door = float(angle)
         self._scene.set_door(self._door)
+        self._still = 0
 
     def _set_lamp(self, level: float) -> None:
         if not 0 <= level <= 1:
