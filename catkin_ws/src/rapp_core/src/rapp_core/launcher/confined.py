@@ -58,6 +58,11 @@ class Confined:
         return self._process.pid
 
     @property
+    def status(self) -> int | None:
+        """Exit status of the program inside, or minus the signal that ended bubblewrap; None while it runs."""
+        return self._process.poll()
+
+    @property
     def alive(self) -> bool:
         """Whether the program inside runs."""
         return self._process.poll() is None

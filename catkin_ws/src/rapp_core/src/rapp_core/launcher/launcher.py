@@ -90,6 +90,7 @@ class Launcher:
         folders = RunFolders(self._runs / secrets.token_hex(6), _account())
         folders.make()
         ours, theirs = socket.socketpair()
+        theirs.setblocking(True)  # rospy sets a default time-out for new sockets, and the flag behind it would be inherited
         try:
             with folders.log.open("wb") as log, theirs:
                 words = command(folders, self._config.limits, self._environment(theirs.fileno()))
@@ -147,4 +148,6 @@ def _copy(package: Path, folder: Path) -> None:
 
 
 def _tail(run: Run) -> str:
-    return run.folders.log.read_text(errors="replace")[-2000:] if run.folders.log.exists() else ""
+    """How a process ended, and the end of what it printed."""
+    text = run.folders.log.read_text(errors="replace")[-2000:] if run.folders.log.exists() else ""
+    return f"(status {run.status}) {text}"

@@ -46,6 +46,11 @@ class Run:
         """Whether its process runs."""
         return self._process.alive
 
+    @property
+    def status(self) -> int | None:
+        """Exit status of its process; None while it runs."""
+        return self._process.status
+
     def wait_ready(self, seconds: float) -> bool:
         """Wait for the spare to be warm; gives whether it is. Returns early when it has died."""
         deadline = time.monotonic() + seconds
