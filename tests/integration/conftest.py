@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +48,7 @@ class Running:
 def running(words: list[str], env: dict[str, str], log: Path) -> Iterator[Running]:
     """A process that prints READY, ended at the end; its stderr goes to `log`."""
     with log.open("ab") as errors:
-        process = subprocess.Popen(
-            words, env=env, stdout=subprocess.PIPE, stderr=errors, text=True, start_new_session=True
-        )
+        process = subprocess.Popen(words, env=env, stdout=subprocess.PIPE, stderr=errors, text=True, start_new_session=True)
     started = Running(process, {})
     try:
         started.ready = _wait_ready(process, log)
@@ -109,22 +107,29 @@ def ros_env(roscore: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     return {**os.environ, "ROS_MASTER_URI": roscore, "ROS_IP": "127.0.0.1", "ROS_LOG_DIR": logs}
 
 
-Start = Callable[..., Any]
+Start = Callable[..., Running]
+
+
+@contextmanager
+def _starter(ros_env: dict[str, str], folder: Path) -> Iterator[Start]:
+    with ExitStack() as stack:
+
+        def start_module(module: str, *words: str, env: dict[str, str] | None = None) -> Running:
+            command = [sys.executable, "-m", module, *words]
+            return stack.enter_context(running(command, {**ros_env, **(env or {})}, folder / f"{module}.log"))
+
+        yield start_module
 
 
 @pytest.fixture
 def start(ros_env: dict[str, str], tmp_path: Path) -> Iterator[Start]:
     """Starts `python -m MODULE WORDS...` in the test's ROS; everything is ended, last first, after the test."""
-    stack: list[Any] = []
+    with _starter(ros_env, tmp_path) as starter:
+        yield starter
 
-    def start_module(module: str, *words: str, env: dict[str, str] | None = None) -> Running:
-        context = running(
-            [sys.executable, "-m", module, *words], {**ros_env, **(env or {})}, tmp_path / f"{module}.log"
-        )
-        started = context.__enter__()
-        stack.append(context)
-        return started
 
-    yield start_module
-    for context in reversed(stack):
-        context.__exit__(None, None, None)
+@pytest.fixture(scope="module")
+def start_for_module(ros_env: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Start]:
+    """As `start`; everything is ended after the last test of the file."""
+    with _starter(ros_env, tmp_path_factory.mktemp("started")) as starter:
+        yield starter

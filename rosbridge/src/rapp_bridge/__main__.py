@@ -58,6 +58,8 @@ async def _serve(config: Config) -> None:
 
 def _join() -> None:
     """Join ROS as a node; waits for the master as long as it takes."""
+    if not rosgraph.is_master_online():
+        _log.warning("waits for the ROS master at %s; start roscore", rosgraph.get_master_uri())
     rospy.init_node("rosbridge", disable_signals=True, disable_rosout=True)
     tcpros_base._tcpros_server.tcp_ros_server.server_sock.listen(BACKLOG)
 

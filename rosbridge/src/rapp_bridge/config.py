@@ -35,10 +35,10 @@ def read(words: Sequence[str], env: Mapping[str, str]) -> Config:
     parser.add_argument(
         "--queue-limit", type=int, default=default.queue_limit, help="bytes that may wait for one client (%(default)s)"
     )
-    options = parser.parse_args(words)
-    return Config(
-        address=options.address, port=options.port, call_timeout=options.call_timeout, queue_limit=options.queue_limit
+    parser.add_argument(
+        "--linger", type=float, default=default.linger, help="seconds a publisher outlives its last client (%(default)g)"
     )
+    return Config(**vars(parser.parse_args(words)))
 
 
 def _positive(text: str) -> float:

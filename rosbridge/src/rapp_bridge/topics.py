@@ -17,6 +17,7 @@ from rapp_bridge.master import Master
 from rapp_bridge.protocol import Advertise, Publish, Subscribe, Unadvertise, Unsubscribe, publication
 
 DEFAULT_QUEUE = 100  # messages of one topic that may wait for one client, when it names no queue_length
+OPENING_KEPT = 32  # messages, at most, that are kept meanwhile
 OPENING = 1.0  # s after the first advertisement in which messages are kept for subscribers that are still connecting
 
 
@@ -30,16 +31,25 @@ class _Opening(rospy.SubscribeListener):  # type: ignore[misc]
 
     def publish(self, publisher: Any, message: Any) -> None:
         """Publish, and keep the message while the topic opens."""
-        if time.monotonic() > self._until:
+        if self.ended():
             publisher.publish(message)
             return
         with self._lock:
             self._recent.append(message)
             publisher.publish(message)
 
+    def ended(self) -> bool:
+        """Whether the topic has been opened; what was kept is then forgotten."""
+        if time.monotonic() <= self._until:
+            return False
+        if self._recent:
+            with self._lock:
+                self._recent.clear()
+        return True
+
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
         """Called by rospy for each new subscriber."""
-        if time.monotonic() <= self._until:
+        if not self.ended():
             with self._lock:
                 for message in self._recent:
                     peer_publish(message)
@@ -133,7 +143,7 @@ class Topics:
         type_name = self._type(wish.topic, wish.type)
         cls = message_class(type_name)
         size = max(1, wish.queue_size)
-        opening = None if wish.latch else _Opening(size)
+        opening = None if wish.latch else _Opening(min(size, OPENING_KEPT))
         try:
             publisher = rospy.Publisher(wish.topic, cls, opening, latch=wish.latch, queue_size=size)
         except (rospy.ROSException, OSError, ValueError) as error:
@@ -151,6 +161,9 @@ class Topics:
     def sweep(self) -> None:
         """Unregister the publishers that no client has used for a while; to be called now and then."""
         with self._change:
+            for entry in self._published.values():
+                if entry.opening is not None:
+                    entry.opening.ended()
             old = time.monotonic() - self._linger
             for topic in [t for t, e in self._published.items() if not e.clients and e.unused_since < old]:
                 self._close_publisher(topic)
