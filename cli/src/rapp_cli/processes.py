@@ -63,9 +63,7 @@ class Child:
                     self._ready.set_result(json.loads(line[6:]))
         if not self._ready.done():
             status = await self._process.wait()
-            self._ready.set_exception(
-                CommandError(f"cannot start {self.name}: it ended with status {status}\n{self.tail()}")
-            )
+            self._ready.set_exception(CommandError(f"cannot start {self.name}: it ended with status {status}\n{self.tail()}"))
 
     def tail(self, lines: int = 15) -> str:
         """The end of the process's log, headed by the log's path."""

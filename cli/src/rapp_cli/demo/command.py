@@ -18,7 +18,7 @@ from rapp_cli.errors import CommandError
 
 __all__ = ["add_options", "run"]
 
-ENOUGH = 0.5  # share of the message's words that must be heard again: the recogniser's own error is 0.2 to 0.4
+ENOUGH = 0.6  # share of the message's words that must be heard again; the recogniser's own error is about 0.15
 
 
 def run(options: argparse.Namespace) -> int:
@@ -59,9 +59,7 @@ async def _show(bridge: str, timeline: Timeline) -> None:
         await timeline.add(entry)
 
 
-async def _unless_something_ends(
-    story: Coroutine[Any, Any, None], system: System, following: asyncio.Task[None]
-) -> None:
+async def _unless_something_ends(story: Coroutine[Any, Any, None], system: System, following: asyncio.Task[None]) -> None:
     """Run the story; a process that ends, or a silent bridge, ends it with a clear error."""
     telling = asyncio.create_task(story)
     ending = asyncio.create_task(system.children.first_ended())

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from email.policy import default
 from pathlib import Path
 
-import soundfile
-from pocketsphinx import Decoder
+from rapp_cloud.interpreter.sound import read_sound
+from rapp_cloud.interpreter.speech import Recogniser, model_folder
+
+LONGEST = 60.0  # s of a recording
+BEAM = 4  # texts looked at at once
 
 
 @dataclass(frozen=True)
@@ -45,11 +48,7 @@ def _words(text: str) -> list[str]:
 
 
 def transcribe(recording: Path) -> str:
-    """Recognise the words of a 16 kHz mono recording with pocketsphinx's general English model."""
-    samples, rate = soundfile.read(recording, dtype="int16")
-    decoder = Decoder(samprate=rate, loglevel="FATAL")
-    decoder.start_utt()
-    decoder.process_raw(samples.tobytes(), full_utt=True)
-    decoder.end_utt()
-    hypothesis = decoder.hyp()
-    return hypothesis.hypstr if hypothesis else ""
+    """What is said in a recording, by the platform's recogniser of free speech."""
+    recogniser = Recogniser(model_folder())
+    texts = recogniser.listen(read_sound(recording, LONGEST), BEAM, recogniser.expect([]), 0.0)
+    return texts[0].text if texts else ""

@@ -31,9 +31,7 @@ class Person:
             await asyncio.to_thread(lambda: self._session.connect(self._robot, _async=True).value(5_000))
             self._world = await asyncio.to_thread(lambda: self._session.service("SimWorld"))
         except RuntimeError as error:
-            raise CommandError(
-                f"cannot reach the simulated room at {self._robot}: {error}; start nao_sim there"
-            ) from error
+            raise CommandError(f"cannot reach the simulated room at {self._robot}: {error}; start nao_sim there") from error
         assert self._world is not None
         self._world.robotSaid.connect(lambda text: loop.call_soon_threadsafe(self._hear, text))
 
