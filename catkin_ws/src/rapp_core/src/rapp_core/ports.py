@@ -8,6 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from rapp_core.manifest import Manifest
+
+INSIDE_PACKAGE = "/rapp/package"
+"""Where a dynamic agent sees its package."""
+
 
 @dataclass(frozen=True)
 class Word:
@@ -107,3 +112,78 @@ class Hop(Protocol):
     @property
     def present(self) -> bool:
         """Whether the link is there at this moment."""
+
+
+class Signal(Protocol):
+    """Something that happens once."""
+
+    def is_set(self) -> bool:
+        """Whether it has happened."""
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for it, at most `timeout` s; gives whether it has happened."""
+
+
+class Agent(Protocol):
+    """One run of a dynamic agent, as the control subsystem sees it. Times are those of the monotonic clock, in s."""
+
+    @property
+    def name(self) -> str:
+        """Name of the run."""
+
+    @property
+    def token(self) -> str:
+        """Secret of the run, told over its own channel."""
+
+    @property
+    def manifest(self) -> Manifest | None:
+        """The RApp's; None before it is activated."""
+
+    @property
+    def recordings(self) -> Path:
+        """Where what is recorded for it goes."""
+
+    @property
+    def package(self) -> Path:
+        """Its package, which it sees as `INSIDE_PACKAGE`."""
+
+    @property
+    def alive(self) -> bool:
+        """Whether its process runs."""
+
+    @property
+    def first_word(self) -> Signal:
+        """It has opened its channel (Fig. 3, s1)."""
+
+    @property
+    def outcome(self) -> tuple[str, str] | None:
+        """ "done" or "failed", and why, once it has sent "terminate"."""
+
+    @property
+    def heartbeat(self) -> float:
+        """When its last heartbeat came."""
+
+    progress: float
+    """When its own loop last moved, or a core service ran for it."""
+
+    def dismantle(self, patience: float, hurry: Signal) -> bool:
+        """Ask it to stop what it has started; gives whether it answered within `patience` s, or before `hurry`."""
+
+    def end(self, patience: float, keep_log: Path | None = None) -> None:
+        """End and reap all its processes: SIGTERM, after `patience` s SIGKILL; what it printed goes to `keep_log`."""
+
+
+Told = Callable[[dict[str, Any]], None]
+
+
+class Agents(Protocol):
+    """Starts dynamic agents (DESIGN section 3.6)."""
+
+    def prepare(self) -> None:
+        """Have a spare warming up."""
+
+    def activate(self, package: Path, told: Told) -> Agent:
+        """Run a package as a dynamic agent; what that sends is told. Raises Invalid, Unreachable, Bug."""
+
+    def log_of(self, manifest: Manifest) -> Path:
+        """Where what a RApp prints is kept."""

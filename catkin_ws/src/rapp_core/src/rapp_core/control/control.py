@@ -3,6 +3,7 @@
 import logging
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,8 @@ from rapp_core.config import Config
 from rapp_core.control.listening import Listener
 from rapp_core.control.platform import Platform
 from rapp_core.errors import CoreError, Refused, Unreachable
-from rapp_core.launcher.launcher import Launcher
 from rapp_core.launcher.lease import Lease
-from rapp_core.launcher.run import Run
-from rapp_core.ports import Hop, Robot
+from rapp_core.ports import Agent, Agents, Hop, Robot
 from rapp_core.services.executor import Executor
 from rapp_core.trace import Happening, Trace
 
@@ -36,13 +35,14 @@ class Parts:
 
     robot: Robot
     hop: Hop
-    launcher: Launcher
+    launcher: Agents
     executor: Executor
     platform: Platform
     lease: Lease
     trace: Trace
     config: Config
     stop: threading.Event
+    now: Callable[[], float] = time.monotonic
 
 
 class Control:
@@ -50,9 +50,9 @@ class Control:
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
-        self._listener = Listener(parts.robot, parts.config, time.monotonic)
+        self._listener = Listener(parts.robot, parts.config, parts.now)
         self._recording = parts.config.home / "listening" / "command.ogg"
-        self._run: Run | None = None
+        self._run: Agent | None = None
 
     # s1, s2: initialise, register
 
@@ -147,14 +147,14 @@ class Control:
             self._problem(share, "I cannot start it", error)
             return
         parts.lease.grant(self._run)
-        share.memory["until"] = time.monotonic() + parts.config.first_word
+        share.memory["until"] = parts.now() + parts.config.first_word
 
     def await_first_word(self, share: Subsystem) -> None:
         """Wait for the dynamic agent's first word over its channel."""
         run = self._present()
         if run.first_word.wait(STEP):
             return
-        late = time.monotonic() > float(str(share.memory["until"]))
+        late = self._parts.now() > float(str(share.memory["until"]))
         if late or self._parts.stop.is_set() or self._parts.lease.problem(True) is not None or run.outcome is not None:
             _log.warning("run %s: no first word: %s", run.name, run.outcome or "dead, silent or late")
             share.memory["problem"] = "It did not start"
@@ -244,7 +244,7 @@ class Control:
             except CoreError as error:
                 _log.info("%s", error)
 
-    def _present(self) -> Run:
+    def _present(self) -> Agent:
         assert self._run is not None
         return self._run
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rapp_core.errors import Invalid
-from rapp_core.launcher.manifest import read_manifest
+from rapp_core.manifest import read_manifest
 
 _log = logging.getLogger(__name__)
 

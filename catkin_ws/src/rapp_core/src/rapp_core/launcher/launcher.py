@@ -13,9 +13,10 @@ from rapp_core.errors import Bug, CoreError, Refused, Unreachable
 from rapp_core.launcher import orphans
 from rapp_core.launcher.channel import Channel
 from rapp_core.launcher.confined import Confined, adopt_orphans
-from rapp_core.launcher.manifest import Manifest, read_manifest
-from rapp_core.launcher.run import Run, Told
+from rapp_core.launcher.run import Run
 from rapp_core.launcher.sandbox import INSIDE_PRIVATE, RunFolders, command
+from rapp_core.manifest import Manifest, read_manifest
+from rapp_core.ports import Told
 
 _log = logging.getLogger(__name__)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from rapp_core.config import Config
 from rapp_core.errors import Refused
-from rapp_core.launcher.run import Run
+from rapp_core.ports import Agent
 
 CRASHED = "It has crashed"
 SILENT = "It does not answer any more"
@@ -19,7 +19,7 @@ HANGS = "It hangs"
 class Grant:
     """One lease of one run; `cut` is set when it ends, and ends the services that still run for it."""
 
-    run: Run
+    run: Agent
     cut: threading.Event = field(default_factory=threading.Event)
 
 
@@ -32,7 +32,7 @@ class Lease:
         self._lock = threading.Lock()
         self._grant: Grant | None = None
 
-    def grant(self, run: Run) -> None:
+    def grant(self, run: Agent) -> None:
         """Give the lease to a run; whoever held it before holds it no more."""
         self.release()
         with self._lock:

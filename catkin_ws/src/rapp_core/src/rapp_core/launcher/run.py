@@ -4,20 +4,19 @@ import logging
 import shutil
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from rapp_core.errors import Invalid, Unreachable
 from rapp_core.launcher.channel import Channel
 from rapp_core.launcher.confined import Confined
-from rapp_core.launcher.manifest import Manifest
-from rapp_core.launcher.sandbox import INSIDE_PACKAGE, RunFolders
+from rapp_core.launcher.sandbox import RunFolders
+from rapp_core.manifest import Manifest
+from rapp_core.ports import INSIDE_PACKAGE, Signal, Told
 
 _log = logging.getLogger(__name__)
-Told = Callable[[dict[str, Any]], None]
 STEP = 0.05  # s between two looks
-LEAVING = 0.5  # s for a dynamic agent that has said "gone" to leave ROS and end by itself
+LEAVING = 1.0  # s for a dynamic agent that has said "gone" to leave ROS and end by itself
 
 
 class Run:
@@ -40,6 +39,16 @@ class Run:
         self._told: Told | None = None
         self._reader = threading.Thread(target=self._read, name=f"channel {name}", daemon=True)
         self._reader.start()
+
+    @property
+    def package(self) -> Path:
+        """See `ports.Agent`."""
+        return self.folders.package
+
+    @property
+    def recordings(self) -> Path:
+        """See `ports.Agent`."""
+        return self.folders.recordings
 
     @property
     def alive(self) -> bool:
@@ -73,7 +82,7 @@ class Run:
             parameters=manifest.parameters,
         )
 
-    def dismantle(self, patience: float, hurry: threading.Event) -> bool:
+    def dismantle(self, patience: float, hurry: Signal) -> bool:
         """Ask it to stop what it has started; gives whether it answered "gone" within `patience` s, or before `hurry`."""
         try:
             self._channel.send(type="dismantle")

@@ -13,12 +13,12 @@ from pathlib import Path
 
 from rapp_core.config import Limits
 from rapp_core.errors import Bug
+from rapp_core.ports import INSIDE_PACKAGE
 
 NOBODY = "65534"
 SYSTEM = ("/usr", "/etc/alternatives", "/etc/hosts", "/etc/ld.so.cache", "/etc/nsswitch.conf", "/etc/localtime")
 RUNNER = "rapp_api.runner"
 PACKAGES = ("rapp_api", "rapp_agent", "rapp_msgs")
-INSIDE_PACKAGE = "/rapp/package"
 INSIDE_PRIVATE = "/rapp/private"
 
 

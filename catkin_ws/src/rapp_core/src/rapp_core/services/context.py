@@ -10,8 +10,7 @@ from typing import Any
 from rapp_agent import Buffer, Machine, Subsystem
 from rapp_core.config import Config
 from rapp_core.errors import CoreError, Invalid, Refused
-from rapp_core.launcher.sandbox import INSIDE_PACKAGE
-from rapp_core.ports import Robot
+from rapp_core.ports import INSIDE_PACKAGE, Robot
 from rapp_core.trace import Trace
 
 STEP = 0.02  # s between steps of a service that waits

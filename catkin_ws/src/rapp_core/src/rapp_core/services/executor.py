@@ -46,8 +46,8 @@ class Executor:
 
     def run_for(self, grant: Grant, name: str, **request: Any) -> Reply:
         """Execute one service for the dynamic agent that holds the lease; cut short when the lease ends. Raises CoreError."""
-        folders = grant.run.folders
-        context = replace(self._context, cut=grant.cut, recordings=folders.recordings, package=folders.package)
+        run = grant.run
+        context = replace(self._context, cut=grant.cut, recordings=run.recordings, package=run.package)
         return self._execute(name, request, context)
 
     def _execute(self, name: str, request: dict[str, Any], context: Context) -> Reply:

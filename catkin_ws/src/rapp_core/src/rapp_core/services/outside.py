@@ -8,8 +8,7 @@ from typing import Any
 
 from rapp_core.config import Config
 from rapp_core.errors import Invalid, Refused
-from rapp_core.launcher.run import Run
-from rapp_core.ports import Hop
+from rapp_core.ports import Agent, Hop
 from rapp_core.trace import Trace
 
 
@@ -22,7 +21,7 @@ class Outside:
         self._trace = trace
         self._numbers = itertools.count(1)
 
-    def cloud_call(self, run: Run, service: str, arguments: str, timeout: float) -> str:
+    def cloud_call(self, run: Agent, service: str, arguments: str, timeout: float) -> str:
         """Call a HOP service; gives its JSON result. Raises Refused, Unreachable, Invalid, Bug."""
         self._allowed(run, service)
         try:
@@ -37,10 +36,10 @@ class Outside:
         self._trace.message(f"repository->dynamic reply {service}")
         return json.dumps(result)
 
-    def send_mail(self, run: Run, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
+    def send_mail(self, run: Agent, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
         """Have a mail sent (paper Fig. 12); gives "delivered" or "kept". Raises Refused, Unreachable, Invalid, Bug."""
         self._allowed(run, "send_mail")
-        if attachment and not Path(attachment).resolve().is_relative_to(run.folders.recordings.resolve()):
+        if attachment and not Path(attachment).resolve().is_relative_to(run.recordings.resolve()):
             raise Refused(f"cannot attach {attachment}: only recordings of this run may leave the robot")
         mail: dict[str, Any] = {
             "recipients": list(recipients),
@@ -55,6 +54,6 @@ class Outside:
         return state
 
     @staticmethod
-    def _allowed(run: Run, service: str) -> None:
+    def _allowed(run: Agent, service: str) -> None:
         if run.manifest is None or service not in run.manifest.cloud:
             raise Refused(f"cannot call {service}: the RApp's package.json does not name it under permissions.cloud")

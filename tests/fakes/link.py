@@ -1,0 +1,47 @@
+"""The link, the platform and the mail server behind it, in memory."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rapp_core.errors import CoreError, Refused, Unreachable
+from rapp_core.ports import Progress
+
+
+class FakeLink:
+    """Implements `ports.Hop`: packages lie in `shelf` by name; `away` makes it unreachable; `errors` fail one service."""
+
+    def __init__(self, shelf: Mapping[str, Path] | None = None, catalogue: list[dict[str, Any]] | None = None) -> None:
+        self.shelf = dict(shelf or {})
+        self.catalogue = catalogue or []
+        self.away = False
+        self.errors: dict[str, CoreError] = {}
+        self.answers: dict[str, Any] = {}
+        self.asked: list[tuple[str, dict[str, Any]]] = []
+
+    @property
+    def present(self) -> bool:
+        return not self.away
+
+    def names(self) -> list[str]:
+        return [name for name, _ in self.asked]
+
+    def request(self, name: str, arguments: Mapping[str, Any], timeout: float, progress: Progress | None = None) -> Any:
+        self.asked.append((name, dict(arguments)))
+        if self.away:
+            raise Unreachable("cannot reach the link: it is away")
+        if name in self.errors:
+            raise self.errors[name]
+        if name in self.answers:
+            return self.answers[name]
+        if name == "install":
+            return self._install(arguments["name"], progress)
+        return {"register": {"registered": True, "lease": 30}, "list_rapps": {"rapps": self.catalogue}}[name]
+
+    def _install(self, name: str, progress: Progress | None) -> dict[str, Any]:
+        if name not in self.shelf:
+            raise Refused(f"cannot install {name}: the store does not have it")
+        for phase in ("downloading", "verified", "installed"):
+            if progress is not None:
+                progress(phase, 1.0)
+        return {"name": name, "version": "1.0.0", "path": str(self.shelf[name]), "installed": True}

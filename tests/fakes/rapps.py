@@ -1,0 +1,42 @@
+"""RApps made for one test."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+AGENT = """from rapp_api import DynamicAgent, cloud, communication
+
+
+class Agent(DynamicAgent):
+    def execute(self) -> None:
+{body}
+"""
+
+
+def write_rapp(folder: Path, name: str, body: str = "pass", keywords: tuple[str, ...] = (), **rapp: Any) -> Path:
+    """A package whose dynamic agent executes `body`; gives its folder."""
+    folder.mkdir(parents=True)
+    manifest = {
+        "name": name,
+        "version": "1.0.0",
+        "description": "made for a test",
+        "rapp": {
+            "agent": "dynamic",
+            "entry": "agent.py",
+            "keywords": {"en": list(keywords or (name,))},
+            "sentences": {"en": [f"please run {name}"]},
+            "permissions": {"core": ["rapp_say"], "cloud": []},
+            **rapp,
+        },
+    }
+    (folder / "package.json").write_text(json.dumps(manifest))
+    indented = "\n".join(f"        {line}" for line in body.splitlines())
+    (folder / "agent.py").write_text(AGENT.format(body=indented))
+    return folder
+
+
+def install_rapp(home: Path, name: str, body: str = "pass", **rapp: Any) -> Path:
+    """A RApp in the place where the link installs them."""
+    folder = write_rapp(home / "rapps" / name / "1.0.0", name, body, **rapp)
+    (folder.parent / "current").symlink_to("1.0.0")
+    return folder

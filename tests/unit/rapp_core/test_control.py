@@ -1,0 +1,369 @@
+"""The core FSM (paper Fig. 2) with everything around it in memory: ways through it, failures, bounds."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fakes.agents import FakeAgent, FakeAgents, Script
+from fakes.clock import Clock
+from fakes.link import FakeLink
+from fakes.rapps import install_rapp, write_rapp
+from fakes.robot import FakeRobot
+from rapp_agent import Subsystem
+from rapp_core.config import Config
+from rapp_core.control.control import Control, Parts
+from rapp_core.control.fsm import core_machine
+from rapp_core.control.platform import Platform
+from rapp_core.errors import Bug, Invalid, Refused, Unreachable
+from rapp_core.launcher.lease import Lease
+from rapp_core.services.context import Context
+from rapp_core.services.executor import Executor
+from rapp_core.trace import Happening, Trace
+
+KEYWORD = ["s3", "s4", "s6", "s7", "s8", "s9", "s10", "s3"]
+LONG = ["s3", "s5", "s6", "s7", "s8", "s9", "s10", "s3"]
+
+
+class Home:
+    """A core agent in a flat where everything is a fake."""
+
+    def __init__(self, folder: Path) -> None:
+        self.clock = Clock()
+        self.fake = FakeRobot(self.clock)
+        self.config = Config(home=folder / "home", heartbeat=1.0, hang=10.0, first_word=15.0)
+        package = write_rapp(folder / "store" / "clock", "clock", keywords=("what time is it",))
+        catalogue = [{"name": "clock", "version": "1.0.0", "keywords": {"en": ["what time is it"]}}]
+        self.link = FakeLink({"clock": package}, catalogue)
+        self.agents = FakeAgents(self.clock, folder / "home", self.fake.journal)
+        self.trace = Trace()
+        self.happenings: list[Happening] = []
+        self.trace.listen(self.happenings.append)
+        self.lease = Lease(self.config, self.clock.now)
+        self.stop = self.clock.event()
+        context = Context(self.fake.robot, self.config, self.trace, folder / "listening", now=self.clock.now)
+        self.executor = Executor(context)
+        self.platform = Platform(self.link, self.config, self.trace)
+        parts = Parts(
+            self.fake.robot, self.link, self.agents, self.executor, self.platform, self.lease, self.trace, self.config,
+            self.stop, self.clock.now,
+        )  # fmt: skip
+        self.control = Control(parts)
+        self.machine = core_machine(self.control)
+        self.machine.listen(self.trace.core_event)
+        self.share = Subsystem("core", memory={"problem": None})
+
+    def step_until(self, done: Callable[[], bool], steps: int = 5000) -> None:
+        for _ in range(steps):
+            if done():
+                return
+            self.machine.step(self.share)
+        raise AssertionError(f"still in {self.machine.state} after {steps} steps: {self.states()}")
+
+    def start(self) -> None:
+        """Come to s3 for the first time; nothing that happened before counts."""
+        self.step_until(lambda: self.machine.state == "s3")
+        self.happenings.clear()
+        self.fake.journal.clear()
+        self.happenings.append(Happening("core", "core", "s3", "entered", "listen"))
+
+    def round(self) -> list[str]:
+        """From s3 once around to s3; gives the states."""
+        self.step_until(lambda: len(self.states()) > 1 and self.machine.state == "s3")
+        return self.states()
+
+    def states(self) -> list[str]:
+        return [each.state for each in self.happenings if each.kind == "entered" and each.machine == "core"]
+
+    def messages(self) -> list[str]:
+        return [each.detail for each in self.happenings if each.kind == "message"]
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Home:
+    home = Home(tmp_path)
+    home.platform._thread = object()  # type: ignore[assignment]  # tries in the background are tested on their own
+    return home
+
+
+def ask(home: Home, text: str = "what time is it", seconds: float = 1.0, **more: Any) -> None:
+    home.fake.person_says_at(home.clock.time + 1.0, text, seconds=seconds, **more)
+
+
+# from s1 to s3
+
+
+def test_initialises_registers_says_so_and_listens(home: Home) -> None:
+    home.step_until(lambda: home.machine.state == "s3")
+    assert home.states() == ["s1", "s2", "s3"]
+    assert home.fake.said() == ["I am ready"]
+    assert home.fake.journal[:4] == ["prepare", "stop motion", "stop playing", "hush"]
+    assert home.link.names() == ["register", "list_rapps"]
+
+
+def test_without_the_platform_it_listens_all_the_same_and_says_so(home: Home) -> None:
+    home.link.away = True
+    home.step_until(lambda: home.machine.state == "s3")
+    assert home.fake.said() == ["I am ready, but I cannot reach the platform"]
+
+
+def test_waits_for_a_robot_that_is_off(home: Home) -> None:
+    home.fake.body.here = False
+    home.clock.at(30.0, lambda: setattr(home.fake.body, "here", True))
+    home.step_until(lambda: home.machine.state == "s3")
+    assert 30.0 <= home.clock.time < 32.0
+
+
+# ways through
+
+
+def test_an_isolated_keyword_runs_its_rapp(home: Home) -> None:
+    home.start()
+    ask(home)
+    assert home.round() == KEYWORD
+    assert ("install", {"name": "clock"}) in home.link.asked
+    assert "interpret" not in home.link.names()
+    assert home.fake.said() == []
+
+
+def test_a_long_command_is_recorded_and_the_platform_names_the_rapp(home: Home) -> None:
+    home.link.answers["interpret"] = {
+        "rapp": "clock",
+        "confidence": 0.9,
+        "text": "please tell me how late it is",
+        "candidates": [],
+    }
+    home.start()
+    ask(home, "please tell me how late it is", seconds=2.5, probability=0.1)
+    assert home.round() == LONG
+    recording = home.config.home / "listening" / "command.ogg"
+    assert ("interpret", {"recording": str(recording), "language": "en"}) in home.link.asked
+    assert recording.exists()
+    assert [each.detail for each in home.happenings if each.kind == "heard"] == ["please tell me how late it is"]
+
+
+def test_dismantling_follows_the_order_of_the_design(home: Home) -> None:
+    home.start()
+    ask(home)
+    home.round()
+    told = [m for m in home.messages() if "dynamic" in m]
+    assert told == [
+        "dynamic->core first_word", "dynamic->core terminate", "core->dynamic dismantle", "dynamic->core gone",
+        "core: dynamic agent destroyed",
+    ]  # fmt: skip
+    journal = home.fake.journal
+    assert journal.index("dismantle") < journal.index("end") < journal.index("prepare")
+
+
+def test_the_lease_is_the_run_s_from_activation_to_its_end(home: Home) -> None:
+    held: list[bool] = []
+
+    def look(agent: FakeAgent) -> None:
+        held.append(home.lease.check(agent.token).run is agent)
+
+    home.agents.script = Script(acts=[(0.05, look), (0.9, look)])
+    home.start()
+    ask(home)
+    home.round()
+    assert held == [True, True]
+    with pytest.raises(Refused):
+        home.lease.check(home.agents.runs[0].token)
+
+
+def test_an_installed_rapp_runs_without_link_and_without_delay(home: Home) -> None:
+    home.link.away = True
+    install_rapp(home.config.home, "clock", keywords=("what time is it",))
+    home.start()
+    asked = len(home.link.asked)
+    ask(home)
+    assert home.round() == KEYWORD
+    assert len(home.link.asked) == asked
+
+
+def test_one_run_after_another(home: Home) -> None:
+    home.start()
+    for _ in range(3):
+        home.happenings[:] = home.happenings[:1]
+        ask(home)
+        assert home.round() == KEYWORD
+    assert not any(run.alive for run in home.agents.runs)
+    assert len(home.agents.runs) == 3
+
+
+# failures: each goes back to s3 and says so aloud
+
+
+def failing_round(home: Home) -> tuple[list[str], list[str]]:
+    states = home.round()
+    return states, home.fake.said()
+
+
+def test_not_understood(home: Home) -> None:
+    home.link.answers["interpret"] = {"rapp": None, "confidence": 0.2, "text": "", "candidates": []}
+    home.start()
+    ask(home, "colourless green ideas", seconds=2.5, probability=0.1)
+    assert failing_round(home) == (["s3", "s5", "s11", "s3"], ["I did not understand you"])
+
+
+@pytest.mark.parametrize("answer", [None, [], "clock"])
+def test_an_interpretation_that_is_none(home: Home, answer: object) -> None:
+    home.link.answers["interpret"] = answer
+    home.start()
+    ask(home, "please tell me how late it is", seconds=2.5, probability=0.1)
+    assert failing_round(home) == (["s3", "s5", "s11", "s3"], ["Something went wrong"])
+
+
+def test_a_long_command_while_the_platform_is_away(home: Home) -> None:
+    home.link.away = True
+    home.start()
+    ask(home, "please tell me how late it is", seconds=2.5, probability=0.1)
+    states, said = failing_round(home)
+    assert states == ["s3", "s5", "s11", "s3"]
+    assert said == ["I cannot reach the platform"]
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (Unreachable("cannot reach the store"), "I cannot reach the platform"),
+        (Refused("cannot install: too big"), "I cannot install clock"),
+        (Invalid("cannot install: the signature is wrong"), "I cannot install clock"),
+    ],
+)
+def test_a_download_that_fails(home: Home, error: Unreachable | Refused | Invalid, words: str) -> None:
+    home.link.errors["install"] = error
+    home.start()
+    ask(home)
+    assert failing_round(home) == (["s3", "s4", "s6", "s11", "s3"], [words])
+
+
+def test_when_the_new_version_cannot_be_downloaded_the_old_one_runs(home: Home) -> None:
+    install_rapp(home.config.home, "clock", keywords=("what time is it",))
+    home.link.catalogue[0]["version"] = "2.0.0"
+    home.link.errors["install"] = Unreachable("cannot reach the store")
+    home.start()
+    ask(home)
+    assert home.round() == KEYWORD
+
+
+def test_a_rapp_that_cannot_be_started(home: Home) -> None:
+    home.agents.error = Bug("cannot start a dynamic agent: its process did not become ready")
+    home.start()
+    ask(home)
+    assert failing_round(home) == (["s3", "s4", "s6", "s7", "s11", "s3"], ["I cannot start it"])
+
+
+def test_a_rapp_without_a_first_word(home: Home) -> None:
+    home.agents.script = Script(first_word=None, terminate=None)
+    home.start()
+    ask(home)
+    assert failing_round(home) == (["s3", "s4", "s6", "s7", "s8", "s10", "s11", "s3"], ["It did not start"])
+    assert home.clock.time == pytest.approx(1.0 + 1.1 + 15.0, abs=1.0)
+
+
+def test_a_rapp_that_dies_before_its_first_word_is_not_waited_for(home: Home) -> None:
+    home.agents.script = Script(first_word=None, terminate=None, crash=0.2)
+    home.start()
+    ask(home)
+    assert failing_round(home)[1] == ["It did not start"]
+    assert home.clock.time < 4.0
+
+
+BROKEN = ["s3", "s4", "s6", "s7", "s8", "s9", "s10", "s11", "s3"]
+
+
+def test_a_rapp_that_fails(home: Home) -> None:
+    home.agents.script = Script(outcome=("failed", "KeyError: 'name'"))
+    home.start()
+    ask(home)
+    assert failing_round(home) == (BROKEN, ["It has failed"])
+    assert "dismantle" in home.fake.journal
+
+
+@pytest.mark.parametrize(
+    ("script", "words", "bound"),
+    [
+        (Script(terminate=None, crash=2.0), "It has crashed", 0.3),
+        (Script(terminate=None, silent=2.0), "It does not answer any more", 1.0 + 0.3),
+        (Script(terminate=None, stuck=2.0), "It hangs", 10.0 + 0.3),
+    ],
+    ids=["crashed", "silent", "hung"],
+)
+def test_motion_is_stopped_within_the_bound_and_before_anything_is_waited_for(
+    home: Home, script: Script, words: str, bound: float
+) -> None:
+    stopped: list[float] = []
+    body = home.fake.robot.body
+    stop = body.stop
+
+    def note() -> None:
+        stopped.append(home.clock.time)
+        stop()
+
+    script.answers_dismantle = False
+    home.agents.script = script
+    home.start()
+    body.stop = note  # type: ignore[method-assign]
+    ask(home)
+    home.step_until(lambda: bool(home.agents.runs))
+    activated = home.clock.time
+    states, said = failing_round(home)
+    assert (states, said) == (BROKEN, [words])
+    assert activated + 1.0 < stopped[0] <= activated + 2.0 + bound
+    assert home.fake.journal.index("stop motion") < home.fake.journal.index("end")
+    if "dismantle" in home.fake.journal:
+        assert home.fake.journal.index("stop motion") < home.fake.journal.index("dismantle")
+    assert home.clock.time <= stopped[0] + 2.0  # back in s3
+
+
+def test_a_loop_ends_with_the_lease(home: Home) -> None:
+    def play(agent: FakeAgent) -> None:
+        (agent.package).mkdir(parents=True)
+        (agent.package / "bell.ogg").write_bytes(b"OggS")
+        grant = home.lease.check(agent.token)
+        fields = {"path": "/rapp/package/bell.ogg", "position": 0.0, "volume": 1.0, "balance": 0.0, "loop": True}
+        home.executor.run_for(grant, "rapp_play_audio", **fields)
+
+    home.agents.script = Script(acts=[(0.5, play)])
+    home.start()
+    ask(home)
+    home.step_until(lambda: home.fake.body.looping is not None)
+    home.round()
+    assert home.fake.body.looping is None
+
+
+def test_an_error_nobody_thought_of_ends_the_run_and_is_said(home: Home) -> None:
+    def sabotage(agent: FakeAgent) -> None:
+        agent.outcome = ()  # type: ignore[assignment]
+
+    home.agents.script = Script(terminate=None, acts=[(0.5, sabotage)])
+    home.start()
+    ask(home)
+    assert home.round()[-2:] == ["s11", "s3"]
+    assert home.fake.said() == ["Something went wrong"]
+    assert not home.agents.runs[0].alive
+    with pytest.raises(Refused):
+        home.lease.check(home.agents.runs[0].token)
+
+
+def test_a_robot_that_goes_away_is_waited_for(home: Home) -> None:
+    home.start()
+    home.clock.after(2.0, lambda: setattr(home.fake.body, "here", False))
+    home.clock.after(20.0, lambda: setattr(home.fake.body, "here", True))
+    home.step_until(lambda: home.clock.time > 25.0)
+    home.happenings[:] = home.happenings[:1]
+    home.step_until(lambda: home.machine.state == "s3" and home.fake.body.listener is None)
+    ask(home)
+    assert home.round() == KEYWORD
+
+
+def test_told_to_end_during_a_run_nothing_is_left(home: Home) -> None:
+    home.agents.script = Script(terminate=None)
+    home.start()
+    ask(home)
+    home.step_until(lambda: home.machine.state == "s9")
+    home.stop.set()
+    home.control.close()
+    assert not home.agents.runs[0].alive
+    assert home.fake.journal[-5:] == ["stop motion", "stop playing", "hush", "end", "rest"]

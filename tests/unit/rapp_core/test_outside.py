@@ -1,0 +1,94 @@
+"""Calls of a dynamic agent that leave the robot: only those its package.json names, only its own recordings."""
+
+from pathlib import Path
+
+import pytest
+
+from fakes.agents import FakeAgent, Script
+from fakes.clock import Clock
+from fakes.link import FakeLink
+from fakes.rapps import write_rapp
+from rapp_core.config import Config
+from rapp_core.errors import Invalid, Refused, Unreachable
+from rapp_core.manifest import read_manifest
+from rapp_core.services.outside import Outside
+from rapp_core.trace import Trace
+
+
+@pytest.fixture
+def agent(tmp_path: Path) -> FakeAgent:
+    permissions = {"core": [], "cloud": ["profile", "send_mail"]}
+    package = write_rapp(tmp_path / "run" / "package", "mailer", permissions=permissions)
+    (tmp_path / "run" / "recordings").mkdir()
+    return FakeAgent(Clock(), tmp_path / "run", read_manifest(package), Script(), [], lambda _message: None)
+
+
+@pytest.fixture
+def link() -> FakeLink:
+    link = FakeLink()
+    link.answers = {"call": {"name": "Maria"}, "send_mail": {"state": "kept", "message_id": "<1>"}}
+    return link
+
+
+@pytest.fixture
+def messages() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def outside(link: FakeLink, messages: list[str]) -> Outside:
+    trace = Trace()
+    trace.listen(lambda happening: messages.append(happening.detail))
+    return Outside(link, Config(name="nao7"), trace)
+
+
+def test_a_permitted_call_is_passed_on_and_answered(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
+    assert outside.cloud_call(agent, "profile", '{"robot": "nao7"}', 2.0) == '{"name": "Maria"}'
+    assert link.asked == [("call", {"service": "profile", "arguments": {"robot": "nao7"}})]
+
+
+@pytest.mark.parametrize("service", ["report", "Profile", ""])
+def test_a_call_that_the_package_does_not_name_is_refused(
+    outside: Outside, agent: FakeAgent, link: FakeLink, service: str
+) -> None:
+    with pytest.raises(Refused, match=r"permissions\.cloud"):
+        outside.cloud_call(agent, service, "{}", 0.0)
+    assert link.asked == []
+
+
+@pytest.mark.parametrize("arguments", ["{", "[1]", '"text"'])
+def test_arguments_that_are_no_object_are_invalid(outside: Outside, agent: FakeAgent, arguments: str) -> None:
+    with pytest.raises(Invalid):
+        outside.cloud_call(agent, "profile", arguments, 0.0)
+
+
+def test_a_mail_follows_figure_12(outside: Outside, agent: FakeAgent, link: FakeLink, messages: list[str]) -> None:
+    recording = agent.recordings / "recording-1.ogg"
+    recording.write_bytes(b"OggS")
+    assert outside.send_mail(agent, ["e@home.example"], "subject", "body", str(recording)) == "kept"
+    assert messages == ["dynamic->mail server request (SMTP)", "mail server->dynamic reply kept"]
+    assert link.asked[0][1]["attachment"] == str(recording)
+
+
+def test_every_mail_has_an_id_of_its_own(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
+    for _ in range(3):
+        outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
+    identities = [arguments["message_id"] for _, arguments in link.asked]
+    assert len(set(identities)) == 3
+    assert all(each.startswith("<") and each.endswith(".rapp>") for each in identities)
+
+
+def test_only_recordings_of_the_run_leave_the_robot(outside: Outside, agent: FakeAgent, tmp_path: Path, link: FakeLink) -> None:
+    secret = tmp_path / "secret.ogg"
+    secret.write_bytes(b"OggS")
+    (agent.recordings / "link.ogg").symlink_to(secret)
+    for path in (secret, agent.recordings / "link.ogg", agent.recordings / ".." / ".." / "secret.ogg"):
+        with pytest.raises(Refused):
+            outside.send_mail(agent, ["e@home.example"], "subject", "body", str(path))
+    assert link.asked == []
+
+
+def test_a_link_that_is_away_is_told(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
+    link.away = True
+    with pytest.raises(Unreachable):
+        outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
