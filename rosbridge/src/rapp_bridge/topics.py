@@ -16,7 +16,7 @@ from rapp_bridge.errors import Invalid, Unreachable
 from rapp_bridge.master import Master
 from rapp_bridge.protocol import Advertise, Publish, Subscribe, Unadvertise, Unsubscribe, publication
 
-DEFAULT_QUEUE = 100  # messages of one topic that may wait for one client, when it names no queue_length
+DEFAULT_QUEUE = 10_000  # messages of one topic that may wait for one client that names no queue_length; bytes bound it too
 OPENING_KEPT = 32  # messages, at most, that are kept meanwhile
 OPENING = 1.0  # s after the first advertisement in which messages are kept for subscribers that are still connecting
 
