@@ -1,0 +1,174 @@
+"""Voice-mail in the paper's words: a person speaks, a mail arrives. Two demos run at once, on real sound and real processes."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from rapp_cli.paths import ROOT
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(400)]
+TIMEOUT = 240  # s of one demo
+
+
+@dataclass(frozen=True)
+class Demo:
+    """A finished run."""
+
+    status: int
+    output: str
+    folder: Path
+
+    @property
+    def entries(self) -> list[dict[str, str]]:
+        """What the agents published, in order."""
+        return [json.loads(line) for line in (self.folder / "timeline.jsonl").read_text().splitlines()]
+
+    def details(self, kind: str, agent: str = "core") -> list[str]:
+        """Details of one kind of entry."""
+        return [e["detail"] for e in self.entries if e["kind"] == kind and e["agent"] == agent]
+
+    def states(self, agent: str) -> list[str]:
+        """States an agent's FSMs entered, sub-FSMs of core services left out."""
+        return [e["state"] for e in self.entries if e["kind"] == "entered" and e["agent"] == agent and "/" not in e["state"]]
+
+    def logs(self) -> str:
+        """The ends of all processes' logs: who did what."""
+        logs = sorted(self.folder.glob("**/*.log"))
+        tails = ["\n".join([f"--- {log}", *log.read_text(errors="replace").splitlines()[-25:]]) for log in logs]
+        return "\n".join([self.output, *tails])
+
+
+def run_demo(folder: Path, *options: str) -> Demo:
+    words = [str(ROOT / "rapp"), "demo", "--folder", str(folder), *options]
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=TIMEOUT, check=False)
+    return Demo(done.returncode, done.stdout, folder)
+
+
+def processes_of(folder: Path) -> list[str]:
+    """Command lines of the running processes that name the folder."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = path.read_bytes().replace(b"\0", b" ").decode(errors="replace")
+        except OSError:
+            continue  # it ended meanwhile
+        if str(folder) in words and int(path.parent.name) != os.getpid():
+            found.append(words)
+    return found
+
+
+@pytest.fixture(scope="module")
+def demos(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Demo]]:
+    wishes = {
+        "keyword": (),
+        "long": (
+            "--long",
+            "--recipient",
+            "Kowalska",
+            "--voice",
+            "en-us+f2",
+            "--message",
+            "I will come home on Sunday afternoon",
+        ),
+    }
+    with ThreadPoolExecutor() as pool:
+        runs = {name: pool.submit(run_demo, tmp_path_factory.mktemp(name), *options) for name, options in wishes.items()}
+        yield {name: run.result() for name, run in runs.items()}
+
+
+def assert_in_order(wanted: Sequence[str], happened: Sequence[str], demo: Demo) -> None:
+    rest = iter(happened)
+    for item in wanted:
+        assert any(item == other for other in rest), f"{item!r} is missing, or not in its place, in {happened}\n{demo.logs()}"
+
+
+@pytest.mark.parametrize("name", ["keyword", "long"])
+def test_the_mail_arrives_with_the_spoken_message_and_nothing_is_left_running(demos: dict[str, Demo], name: str) -> None:
+    demo = demos[name]
+    assert demo.status == 0, demo.logs()
+    assert len(list((demo.folder / "mail" / "new").iterdir())) == 1
+    assert processes_of(demo.folder) == []
+
+
+def test_a_keyword_is_understood_by_the_core_agent_itself(demos: dict[str, Demo]) -> None:
+    demo = demos["keyword"]
+    expected = ["s1", "s2", "s3", "s4", "s6", "s7", "s8", "s9", "s10", "s3"]
+    assert [s for s in demo.states("core") if s != "s1"] == expected[1:], demo.logs()
+    assert demo.details("heard") == ["e-mail", "Elizabeth"]
+
+
+def test_a_long_command_is_recorded_by_the_core_agent_and_interpreted_by_the_platform(demos: dict[str, Demo]) -> None:
+    demo = demos["long"]
+    assert_in_order(["s3", "s5", "s6", "s7", "s8", "s9", "s10", "s3"], demo.states("core"), demo)
+    assert_in_order(["core->repository interpret", "core->repository install voice_mail"], demo.details("message"), demo)
+    assert "Kowalska" in demo.details("heard")
+
+
+def test_the_dynamic_agent_walks_figures_3_and_8(demos: dict[str, Demo]) -> None:
+    demo = demos["keyword"]
+    walked = demo.states("dynamic")
+    assert walked == ["s1", "s2", "s3", "s31", "s32", "s33", "s34", "s35", "s36", "end", "s4", "s5"], demo.logs()
+    said = ["starting word recognition", "recording message", "sending e-mail"]
+    assert_in_order(said, demo.details("said"), demo)
+
+
+@pytest.mark.parametrize(
+    "messages",
+    [
+        pytest.param(
+            ["dynamic->core rapp_say", "core->ALTextToSpeech say (synchronous)", "ALTextToSpeech->core reply",
+             "core->dynamic reply rapp_say"],
+            id="Figs 5 and 10: say",
+        ),
+        pytest.param(
+            ["dynamic->core rapp_recognize", "core->ALSpeechRecognition setVocabulary", "core->ALSpeechRecognition subscribe",
+             "ALMemory->core WordRecognized", "core->dynamic reply rapp_recognize"],
+            id="Figs 6 and 11: recognise a word",
+        ),
+        pytest.param(
+            ["dynamic->core rapp_record", "core->ALAudioRecorder startMicrophonesRecording (asynchronous)",
+             "core->ALAudioRecorder stopMicrophonesRecording (asynchronous)", "core->dynamic reply rapp_record"],
+            id="Figs 7 and 9: record",
+        ),
+        pytest.param(
+            ["dynamic->core rapp_send_mail", "dynamic->mail server request (SMTP)", "mail server->dynamic reply delivered",
+             "core->dynamic reply rapp_send_mail"],
+            id="Fig 12: send an e-mail",
+        ),
+        pytest.param(
+            ["dynamic->core terminate", "core->dynamic dismantle", "dynamic->core gone", "core: dynamic agent destroyed"],
+            id="dismantling",
+        ),
+    ],
+)  # fmt: skip
+def test_messages_come_in_the_order_of_the_papers_figures(demos: dict[str, Demo], messages: list[str]) -> None:
+    demo = demos["keyword"]
+    assert_in_order(messages, demo.details("message"), demo)
+
+
+def test_an_interrupted_demo_leaves_no_process(tmp_path: Path) -> None:
+    words = [str(ROOT / "rapp"), "demo", "--folder", str(tmp_path)]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    assert process.stdout is not None
+    try:
+        for line in process.stdout:
+            if " s9 " in line:  # a dynamic agent is running
+                break
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=60)
+        assert process.returncode == 130, output
+    finally:
+        process.kill()
+        process.wait()
+    deadline = time.monotonic() + 10
+    while processes_of(tmp_path) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert processes_of(tmp_path) == []

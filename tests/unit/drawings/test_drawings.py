@@ -1,0 +1,46 @@
+"""The drawings in ARCHITECTURE.md are those of the code. `RAPP_DRAW=1 ./rapp test -- tests/unit/drawings` writes them anew."""
+
+import importlib.util
+import os
+import re
+from pathlib import Path
+from unittest.mock import create_autospec
+
+import pytest
+
+from rapp_agent import Machine, to_mermaid
+from rapp_api import DynamicAgent
+from rapp_cli.paths import ROOT, STORE
+from rapp_core.control.fsm import Acts, core_machine
+
+ARCHITECTURE = ROOT / "ARCHITECTURE.md"
+
+
+def voice_mail() -> Machine:
+    spec = importlib.util.spec_from_file_location("voice_mail_agent", STORE / "voice_mail" / "agent.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    machine: Machine = module.VoiceMail().task()
+    return machine
+
+
+MACHINES = {
+    "core": lambda: core_machine(create_autospec(Acts, instance=True)),
+    "dynamic": lambda: DynamicAgent().machine(lambda: None, lambda _error: None),
+    "voice_mail": voice_mail,
+}
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_drawing_is_that_of_the_code(name: str) -> None:
+    text = ARCHITECTURE.read_text()
+    drawing = re.compile(rf"(<!-- drawing: {name} -->\n```mermaid\n)(.*?)(```\n)", re.DOTALL)
+    found = drawing.search(text)
+    assert found, f"ARCHITECTURE.md has no place for a drawing of {name}"
+    drawn = to_mermaid(MACHINES[name]())
+    if os.environ.get("RAPP_DRAW"):
+        Path(ARCHITECTURE).write_text(text[: found.start(2)] + drawn + text[found.end(2) :])
+        return
+    assert found[2] == drawn, "the drawing differs from the code: run RAPP_DRAW=1 ./rapp test -- tests/unit/drawings"
