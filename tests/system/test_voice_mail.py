@@ -16,6 +16,7 @@ from rapp_cli.paths import ROOT
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(400)]
 TIMEOUT = 240  # s of one demo
+SUNDAY = "I will come home on Sunday afternoon"
 
 
 @dataclass(frozen=True)
