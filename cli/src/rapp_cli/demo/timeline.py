@@ -36,12 +36,12 @@ class Timeline:
         self._changed = asyncio.Condition()
 
     async def add(self, entry: Entry) -> None:
-        """Keep one entry, print it unless it is a mere leaving, wake those who wait."""
+        """Keep one entry, print it unless it is a mere leaving or within a core service, wake those who wait."""
         self.entries.append(entry)
         if self._record is not None:
             with self._record.open("a") as record:
                 record.write(json.dumps(asdict(entry)) + "\n")
-        if entry.kind != "left":
+        if entry.kind != "left" and "/" not in entry.state:
             self._print(entry)
         async with self._changed:
             self._changed.notify_all()
