@@ -200,7 +200,7 @@ def failing_round(home: Home) -> tuple[list[str], list[str]]:
 
 
 def test_not_understood(home: Home) -> None:
-    home.link.answers["interpret"] = {"rapp": None, "confidence": 0.2, "text": "", "candidates": []}
+    home.link.answers["interpret"] = {"rapp": None, "confidence": 0.2, "text": ""}
     home.start()
     ask(home, "colourless green ideas", seconds=2.5, probability=0.1)
     assert failing_round(home) == (["s3", "s5", "s11", "s3"], ["I did not understand you"])

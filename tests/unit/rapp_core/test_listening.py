@@ -11,7 +11,8 @@ from rapp_core.control.listening import Listener
 from rapp_core.errors import Unreachable
 
 CONFIG = Config(
-    threshold=0.4, long_command=1.4, longest_keyword=2.5, end_of_command=0.8, verdict=0.8, listening_round=10, longest_command=30
+    threshold=0.4, long_command=1.4, longest_keyword=2.5, end_of_command=0.8, verdict=0.8, listening_round=10.0,
+    longest_command=30.0,
 )  # fmt: skip
 
 

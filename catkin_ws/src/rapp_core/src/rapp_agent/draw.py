@@ -14,7 +14,7 @@ def _mermaid(machine: Machine, prefix: str, depth: int) -> Iterator[str]:
     pad = "    " * depth
     for name, state in machine.states.items():
         node = prefix + name
-        label = f"{name} {state.label}".strip()
+        label = _words(f"{name} {state.label}".strip())
         if isinstance(state, Machine):
             yield f'{pad}state "{label}" as {node} {{'
             yield from _mermaid(state, f"{node}_", depth + 1)
@@ -23,20 +23,38 @@ def _mermaid(machine: Machine, prefix: str, depth: int) -> Iterator[str]:
             yield f"{pad}{node} : {label}"
     yield f"{pad}[*] --> {prefix}{machine.initial}"
     for edge in machine.edges:
-        yield f"{pad}{prefix}{edge.source} --> {prefix}{edge.target}" + (f" : {edge.label}" if edge.label else "")
+        label = f" : {_words(edge.label)}" if edge.label else ""
+        yield f"{pad}{prefix}{edge.source} --> {prefix}{edge.target}{label}"
     for final in sorted(machine.finals):
         yield f"{pad}{prefix}{final} --> [*]"
+    if machine.failure:
+        yield f"{pad}note right of {prefix}{machine.failure} : every failure leads here"
+
+
+def _words(text: str) -> str:
+    """A label without what Mermaid would take as its own syntax."""
+    return " ".join(text.split()).replace(";", ",").replace('"', "#quot;")
 
 
 def to_dot(machine: Machine) -> str:
-    """The machine as a Graphviz digraph; sub-FSMs are double circles, as in Figs 2 and 3 of the paper."""
-    lines = [f'digraph "{machine.name}" {{', "    rankdir=LR;"]
+    """The machine as a Graphviz digraph; sub-FSMs are double circles, as in Figs 2 and 3 of the paper.
+
+    A dot marks where it begins, bold circles where it ends, a dashed circle where every failure leads.
+    """
+    lines = [f"digraph {_quoted(machine.name)} {{", "    rankdir=LR;", "    begin [shape=point];"]
     for name, state in machine.states.items():
+        styles = ["bold"] * (name in machine.finals) + ["dashed"] * (name == machine.failure)
         shape = "doublecircle" if isinstance(state, Machine) else "circle"
-        lines.append(f'    "{name}" [shape={shape}, label="{name}\\n{_escape(state.label)}"];')
-    lines += [f'    "{e.source}" -> "{e.target}" [label="{_escape(e.label)}"];' for e in machine.edges]
+        style = f', style="{",".join(styles)}"' if styles else ""
+        label = _quoted(f"{name}\n{state.label}".strip())
+        lines.append(f"    {_quoted(name)} [shape={shape}, label={label}{style}];")
+    lines.append(f"    begin -> {_quoted(machine.initial)};")
+    for edge in machine.edges:
+        label = f" [label={_quoted(edge.label)}]" if edge.label else ""
+        lines.append(f"    {_quoted(edge.source)} -> {_quoted(edge.target)}{label};")
     return "\n".join([*lines, "}"]) + "\n"
 
 
-def _escape(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"')
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'

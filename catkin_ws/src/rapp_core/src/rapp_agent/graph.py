@@ -1,8 +1,8 @@
 """The checks of a machine's graph, made when it is built, so that a bad graph never runs."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from rapp_agent.behaviour import Edge
+from rapp_agent.behaviour import Behaviour, Edge, always
 from rapp_agent.errors import GraphError
 
 
@@ -14,12 +14,16 @@ def check(
     finals: Iterable[str],
     failure: str | None,
 ) -> None:
-    """Raise GraphError for unknown names, unreachable states, dead ends, or a machine that cannot end."""
+    """Raise GraphError for unknown or doubled names, states that cannot be reached or left, edges that are never taken.
+
+    A machine without any final state is sound: it goes round for ever, as the core agent's does.
+    """
     finals = set(finals)
     named = {initial, *finals, *(e.source for e in edges), *(e.target for e in edges), *({failure} if failure else ())}
     for unknown in sorted(named - set(states)):
         raise GraphError(f"cannot build machine {name}: {unknown} is no state of it")
     _check_identity(name, states)
+    _check_edges(name, edges, finals)
     targets = {state: {e.target for e in edges if e.source == state} for state in states}
     for state in states:
         if not targets[state] and state not in finals:
@@ -28,18 +32,42 @@ def check(
     for state in states:
         if state not in reached:
             raise GraphError(f"cannot build machine {name}: {state} cannot be reached from {initial}")
-    for state in states:
         if finals and not _reachable(state, targets) & finals:
             raise GraphError(f"cannot build machine {name}: no final state can be reached from {state}")
 
 
+def _check_edges(name: str, edges: Sequence[Edge], finals: set[str]) -> None:
+    """Each edge must be one that can be taken."""
+    closed: dict[str, str] = {}
+    for edge in edges:
+        if edge.source in finals:
+            raise GraphError(f"cannot build machine {name}: {edge.source} is final, so its edge to {edge.target} is never taken")
+        if edge.source in closed:
+            earlier = f"the one to {closed[edge.source]} always is"
+            raise GraphError(f"cannot build machine {name}: the edge {edge.source} to {edge.target} is never taken, {earlier}")
+        if edge.when is always:
+            closed[edge.source] = edge.target
+
+
 def _check_identity(name: str, states: Mapping[str, object]) -> None:
-    """One Machine object cannot be two states: its position would be shared."""
-    seen: set[int] = set()
+    """A behaviour is named as its state; one Machine object cannot be two states, for its position would be shared."""
     for state, inner in states.items():
-        if hasattr(inner, "step") and id(inner) in seen:
-            raise GraphError(f"cannot build machine {name}: {state} is the same machine as another state")
+        if isinstance(inner, Behaviour) and inner.name != state:
+            raise GraphError(f"cannot build machine {name}: state {state} holds the behaviour {inner.name}")
+    seen: set[int] = set()
+    for inner in _machines(states):
+        if id(inner) in seen:
+            raise GraphError(f"cannot build machine {name}: one machine object is two of its states; build it twice")
         seen.add(id(inner))
+
+
+def _machines(states: Mapping[str, object]) -> Iterator[object]:
+    """All machines nested in these states, at any depth."""
+    for inner in states.values():
+        deeper = getattr(inner, "states", None)
+        if deeper is not None:
+            yield inner
+            yield from _machines(deeper)
 
 
 def _reachable(start: str, targets: Mapping[str, set[str]]) -> set[str]:

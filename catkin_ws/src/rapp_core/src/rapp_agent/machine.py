@@ -16,8 +16,9 @@ class Machine:
     """A graph of states, each a Behaviour or another Machine (a sub-FSM).
 
     Rules it keeps: one step executes one transition function; a state is left only after its terminal condition held;
-    a nested machine is stepped to its final state before its own edges are tried; an exception in a transition is told
-    as "failed", and leads to the state `failure` with memory["error"] set, or is raised when there is none.
+    a nested machine is stepped to its final state before its own edges are tried; an exception in a state is told as
+    "failed", and leads to the state `failure` with memory["error"] set, or is raised when there is none (the machine is
+    then to be reset); `on_leave` runs once for every state that was entered, also for one that fails.
     """
 
     def __init__(
@@ -37,9 +38,11 @@ class Machine:
         self.finals = frozenset(finals)
         self.failure = failure
         self.label = label
-        self._listeners: list[Listener] = []
+        self._listeners: list[list[Listener]] = []
         self._current: str | None = None
         self._finished = False
+        self._leaving = False
+        self._broken = False
         check(name, self.states, initial, self.edges, self.finals, failure)
         for state, inner in self.states.items():
             if isinstance(inner, Machine):
@@ -65,21 +68,31 @@ class Machine:
 
     def listen(self, callback: Listener) -> Callable[[], None]:
         """Tell `callback` every event of this machine and those nested in it; gives the function that ends that."""
-        self._listeners.append(callback)
-        return lambda: self._listeners.remove(callback)
+        entry = [callback]  # an object of its own: one callback may listen twice
+        self._listeners.append(entry)
+
+        def unsubscribe() -> None:
+            self._listeners = [other for other in self._listeners if other is not entry]
+
+        return unsubscribe
 
     def reset(self) -> None:
         """Go back to before the first step, without a word to the listeners."""
         self._current = None
-        self._finished = False
+        self._finished = self._leaving = self._broken = False
         for inner in self.states.values():
             if isinstance(inner, Machine):
                 inner.reset()
 
     def step(self, subsystem: Subsystem) -> bool:
-        """Execute one transition function; gives True when the machine has ended (again and again, until reset)."""
+        """Execute one transition function; gives True when the machine has ended (again and again, until reset).
+
+        Raises what a state raised when there is no `failure` state to go to, then AgentError until reset.
+        """
         if self._finished:
             return True
+        if self._broken:
+            raise AgentError(f"cannot step machine {self.name}: its state {self._current} has failed; reset it first")
         try:
             if self._current is None:
                 self._enter(self.initial, subsystem)
@@ -109,6 +122,7 @@ class Machine:
 
     def _enter(self, name: str, subsystem: Subsystem) -> None:
         self._current = name
+        self._leaving = False
         state = self.states[name]
         self._tell("entered", name, state.label)
         if isinstance(state, Machine):
@@ -117,12 +131,14 @@ class Machine:
             state.on_enter(subsystem)
 
     def _leave(self, subsystem: Subsystem) -> None:
-        assert self._current is not None
-        name = self._current
-        state = self.states[name]
+        self._undo(subsystem)
+        self._tell("left", str(self._current))
+
+    def _undo(self, subsystem: Subsystem) -> None:
+        state = self.states[str(self._current)]
+        self._leaving = True
         if isinstance(state, Behaviour) and state.on_leave is not None:
             state.on_leave(subsystem)
-        self._tell("left", name)
 
     def _advance(self, subsystem: Subsystem) -> None:
         name = self._current
@@ -139,14 +155,22 @@ class Machine:
         raise GraphError(f"cannot go on from {name} of machine {self.name}: no edge's condition holds")
 
     def _fail(self, error: Exception, subsystem: Subsystem) -> None:
-        assert self._current is not None
-        name = self._current
+        name = str(self._current)
         self._tell("failed", name, f"{type(error).__name__}: {error}")
+        if not self._leaving:
+            try:
+                self._undo(subsystem)
+            except Exception as second:  # noqa: BLE001 - the first error is the one to report
+                error.add_note(f"and leaving {name} failed too: {second!r}")
         if self.failure is None or name == self.failure:
+            self._broken = True
             raise error
         subsystem.memory["error"] = error
-        self._leave(subsystem)
-        self._enter(self.failure, subsystem)
+        self._tell("left", name)
+        try:
+            self._enter(self.failure, subsystem)
+        except Exception as second:  # noqa: BLE001 - as in `step`
+            self._fail(second, subsystem)
 
     def _tell(self, kind: Kind, state: str, detail: str = "") -> None:
         self._send(Event(kind, self.name, state, (state,), detail))
@@ -155,5 +179,5 @@ class Machine:
         self._send(Event(event.kind, event.machine, event.state, (state, *event.path), event.detail))
 
     def _send(self, event: Event) -> None:
-        for listener in tuple(self._listeners):
+        for (listener,) in tuple(self._listeners):
             listener(event)

@@ -1,0 +1,164 @@
+"""What a dynamic agent sees and may use, found out from inside the real sandbox (DESIGN section 3.6)."""
+
+import os
+from pathlib import Path
+
+
+def test_it_reads_no_other_file_of_the_robot(workshop, tmp_path):
+    secret = tmp_path / "home" / "secret"
+    secret.write_text("of the robot")
+    places = [secret, Path(__file__), Path.home(), tmp_path / "package1"]
+    places += map(Path, ("/etc/shadow", "/etc/passwd", "/home", "/var"))
+    body = f"""
+import os
+facts = []
+for place in {[str(place) for place in places]!r}:
+    if os.path.isfile(place) or (os.path.isdir(place) and os.listdir(place)):
+        facts.append(place)
+"""
+    facts = workshop.facts(body.strip())
+    assert facts == []
+
+
+def test_it_writes_in_its_private_folder_only(workshop):
+    facts = workshop.facts(
+        """
+import os
+facts = {}
+prefix = __import__("sys").prefix
+for place in ("/", "/tmp", "/usr", "/etc", "/rapp", "/rapp/package", "/dev", "/proc", prefix, os.environ["HOME"]):
+    try:
+        with open(os.path.join(place, "written"), "w") as file:
+            file.write("x")
+        facts[place] = True
+    except OSError:
+        facts[place] = False
+""".strip()
+    )
+    assert [place for place, writable in facts.items() if writable] == ["/rapp/private"]
+
+
+def test_the_package_and_the_recordings_are_read_only_copies(workshop):
+    run = workshop.start("import time\nwhile True: time.sleep(0.1)")
+    assert (run.package / "agent.py").exists()
+    (run.recordings / "recording.ogg").write_bytes(b"OggS")
+    inside = Path(f"/proc/{run._process.first}/root")
+    assert (inside / "rapp/package/agent.py").read_text() == (run.package / "agent.py").read_text()
+    assert (inside / str(run.recordings)[1:] / "recording.ogg").read_bytes() == b"OggS"
+    mounts = Path(f"/proc/{run._process.first}/mounts").read_text().splitlines()
+    options = {line.split()[1]: line.split()[3].split(",") for line in mounts}
+    assert "ro" in options["/rapp/package"]
+    assert "ro" in options[str(run.recordings)]
+
+
+def test_it_is_nobody_and_can_become_nobody_else(workshop):
+    facts = workshop.facts(
+        """
+import os
+status = dict(line.split(":", 1) for line in open("/proc/self/status"))
+facts = {"uid": os.getuid(), "groups": os.getgroups(), "caps": status["CapEff"].strip(), "new": status["NoNewPrivs"].strip()}
+try:
+    os.setuid(0)
+    facts["root"] = True
+except OSError:
+    facts["root"] = False
+""".strip()
+    )
+    assert facts["uid"] != 0
+    assert facts["groups"] in ([], [65534])
+    assert (int(facts["caps"], 16), facts["new"], facts["root"]) == (0, "1", False)
+
+
+def test_it_sees_only_its_own_processes(workshop):
+    facts = workshop.facts("import os\nfacts = [p for p in os.listdir('/proc') if p.isdigit()]")
+    assert 1 <= len(facts) <= 3
+
+
+def test_it_inherits_one_descriptor_and_no_environment(workshop, monkeypatch):
+    monkeypatch.setenv("RAPP_SMTP_PASSWORD", "of the robot")
+    facts = workshop.facts(
+        """
+import os, stat
+kinds = {}
+for number in os.listdir("/proc/self/fd"):
+    try:
+        kinds[number] = os.readlink(f"/proc/self/fd/{number}")
+    except OSError:
+        pass
+facts = {"fds": kinds, "env": sorted(os.environ), "channel": os.environ["RAPP_CHANNEL_FD"]}
+""".strip()
+    )
+    own = ("/rapp/private/", "/proc/")  # what it has opened itself: rospy's log, the list of descriptors
+    files = {number: kind for number, kind in facts["fds"].items() if kind.startswith("/") and not kind.startswith(own)}
+    assert set(files) == {"0", "1", "2"}, files
+    assert facts["fds"][facts["channel"]].startswith("socket:")
+    assert set(facts["env"]) <= {
+        "HOME", "LANG", "PATH", "PWD", "PYTHONDONTWRITEBYTECODE", "RAPP_CHANNEL_FD", "ROS_HOME", "ROS_IP", "ROS_LOG_DIR",
+        "ROS_MASTER_URI", "TMPDIR", "LC_CTYPE", "ROS_LOG_FILENAME",
+    }  # fmt: skip
+
+
+def test_memory_has_a_limit(workshop):
+    body = """
+facts = []
+for size in (100 << 20, 2 << 30):
+    try:
+        block = bytearray(size)
+        facts.append(True)
+    except MemoryError:
+        facts.append(False)
+"""
+    assert workshop.facts(body.strip()) == [True, False]
+
+
+def test_processes_have_a_limit_that_others_do_not_feel(workshop):
+    body = """
+import os, time
+facts = 0
+try:
+    while facts < 200:
+        if os.fork() == 0:
+            time.sleep(60)
+            os._exit(0)
+        facts += 1
+except OSError:
+    pass
+"""
+    first = workshop.facts(body.strip())
+    assert 0 < first < 40
+    assert abs(workshop.facts(body.strip()) - first) <= 2
+
+
+def test_files_have_limits_of_size_and_number(workshop):
+    body = """
+import os, signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+facts = {"open": 0, "size": 0}
+with open("large", "wb", buffering=0) as file:
+    try:
+        for _ in range(100):
+            facts["size"] += file.write(bytes(100_000))
+    except OSError:
+        pass
+files = []
+try:
+    while facts["open"] < 500:
+        files.append(open("large"))
+        facts["open"] += 1
+except OSError:
+    pass
+files.clear()
+"""
+    facts = workshop.facts(body.strip())
+    assert facts["size"] == 1 << 20
+    assert 0 < facts["open"] < 64
+
+
+def test_the_account_is_the_run_s_own_when_root_starts_it(workshop):
+    runs = [workshop.start("import time\nwhile True: time.sleep(0.1)") for _ in range(2)]
+    accounts = [run.folders.account for run in runs]
+    if os.geteuid() == 0:
+        assert all(account is not None and 65000 <= account < 65500 for account in accounts)
+        assert {run.folders.private.stat().st_uid for run in runs} == set(accounts)
+    else:
+        assert accounts == [None, None]

@@ -1,0 +1,82 @@
+"""`robot`: every process of a robot is started, found, and ended."""
+
+import json
+import os
+import select
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).parents[3] / "catkin_ws" / "src" / "rapp_core" / "scripts" / "robot"
+WORDS = ("--microphone", "text", "--voice", "silent", "--no-world")
+READY = 60.0  # s
+
+
+def running(pid):
+    """Whether a process runs; one that only waits to be reaped does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def children(parent):
+    pids = [int(folder.name) for folder in Path("/proc").glob("[0-9]*")]
+    return [pid for pid in pids if running(pid) and parent_of(pid) == parent]
+
+
+def parent_of(pid):
+    try:
+        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:
+        return None
+
+
+@pytest.fixture
+def robot(tmp_path):
+    process = subprocess.Popen(
+        [SCRIPT, "--home", str(tmp_path / "home"), *WORDS],
+        env={**os.environ, "RAPP_CLOUD": "http://127.0.0.1:1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    yield process
+    if process.poll() is None:
+        process.terminate()
+    process.communicate(timeout=30)
+
+
+def ready(robot):
+    assert select.select([robot.stdout], [], [], READY)[0], "it did not become ready"
+    line = robot.stdout.readline()
+    assert line.startswith("READY "), line
+    return json.loads(line[6:])
+
+
+def test_starts_all_and_leaves_none(robot, tmp_path):
+    reached = ready(robot)
+    assert reached["bridge"].startswith("ws://127.0.0.1:")
+    assert reached["robot"].startswith("tcp://127.0.0.1:")
+    assert reached["master"].startswith("http://127.0.0.1:")
+    pids = children(robot.pid)
+    grandchildren = [pid for child in pids for pid in children(child)]
+    assert len(pids) == 5
+    assert grandchildren  # the spare's sandbox, at least
+    robot.send_signal(signal.SIGTERM)
+    assert robot.wait(30) == 0
+    assert [pid for pid in (*pids, *grandchildren) if running(pid)] == []
+    logs = {path.name for path in (tmp_path / "home" / "logs").glob("*.log")}
+    assert logs >= {"roscore.log", "nao_sim.log", "rosbridge.log", "link.log", "core_agent.log"}
+
+
+def test_when_one_process_ends_all_end_and_its_log_is_shown(robot):
+    ready(robot)
+    pids = children(robot.pid)
+    os.kill(pids[-1], signal.SIGKILL)
+    assert robot.wait(30) == 1
+    assert "so the robot ends" in robot.stderr.read()
+    assert [pid for pid in pids if running(pid)] == []
