@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from rapp_cli import processes
 from rapp_cli.errors import CommandError
 from rapp_cli.processes import Child, Children

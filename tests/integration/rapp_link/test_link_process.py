@@ -37,7 +37,7 @@ for line in sys.stdin:
             rospy.wait_for_service("rapp_hop/" + name, 10)
             answer = rospy.ServiceProxy("rapp_hop/" + name, HopRequest)(job, arguments, timeout)
             write(asked=job, accepted=answer.accepted, message=answer.message)
-        except (rospy.ServiceException, rospy.ROSException) as error: write(asked=job, accepted=False, message="ROS: %s" % error)
+        except (rospy.ServiceException, rospy.ROSException) as error: write(asked=job, accepted=False, message=str(error))
     elif what == "cancel": cancel.publish(rest[0])
     elif what == "alive": write(age=time.monotonic() - alive_at[0], sign=alive_at[1], events=events.get_num_connections())
 """
@@ -134,7 +134,8 @@ Start = Callable[..., Any]
 
 def start_link(start: Start, home: Path, bridge: int, mail: int, cloud: str = "http://127.0.0.1:9") -> Any:
     words = ["--bridge", f"ws://127.0.0.1:{bridge}", "--home", str(home), "--cloud", cloud]
-    words += ["--smtp-host", "127.0.0.1", "--smtp-port", str(mail), "--smtp-security", "none", "--mail-from", "nao@home.example"]
+    words += ["--smtp-host", "127.0.0.1", "--smtp-port", str(mail), "--smtp-security", "none"]
+    words += ["--mail-from", "nao@home.example"]
     return start("rapp_link", *words)
 
 

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 import pytest
+
 from rapp_cli.demo.config import KEYWORD, SENTENCE, DemoConfig, add_options, read
 from rapp_cli.errors import UsageError
 

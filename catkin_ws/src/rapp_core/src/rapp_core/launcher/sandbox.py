@@ -74,7 +74,8 @@ def command(folders: RunFolders, limits: Limits, environment: dict[str, str]) ->
     words += ["--bind", str(folders.private), INSIDE_PRIVATE, "--chdir", INSIDE_PRIVATE]
     for name, value in environment.items():
         words += ["--setenv", name, value]
-    words += ["--remount-ro", "/"]
+    for folder in ("/tmp", "/dev", "/"):
+        words += ["--remount-ro", folder]
     return [*words, *_unprivileged(folders.account), *_limited(limits), sys.executable, "-m", RUNNER]
 
 
