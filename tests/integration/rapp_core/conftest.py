@@ -63,9 +63,7 @@ class Workshop:
 
     def facts(self, body: str) -> Any:
         """What `body` puts into `facts`, found out from inside a sandbox."""
-        text, outcome = self.finish(
-            self.start(f"import json\nfacts = None\n{body}\nprint('FACTS', json.dumps(facts), flush=True)")
-        )
+        text, outcome = self.finish(self.start(f"import json\nfacts = None\n{body}\nprint('FACTS', json.dumps(facts), flush=True)"))
         assert outcome == "done", text
         return json.loads(next(line for line in text.splitlines() if line.startswith("FACTS "))[6:])
 

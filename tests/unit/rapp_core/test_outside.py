@@ -48,9 +48,7 @@ def test_a_permitted_call_is_passed_on_and_answered(outside: Outside, agent: Fak
 
 
 @pytest.mark.parametrize("service", ["report", "Profile", ""])
-def test_a_call_that_the_package_does_not_name_is_refused(
-    outside: Outside, agent: FakeAgent, link: FakeLink, service: str
-) -> None:
+def test_a_call_that_the_package_does_not_name_is_refused(outside: Outside, agent: FakeAgent, link: FakeLink, service: str) -> None:
     with pytest.raises(Refused, match=r"permissions\.cloud"):
         outside.cloud_call(agent, service, "{}", 0.0)
     assert link.asked == []

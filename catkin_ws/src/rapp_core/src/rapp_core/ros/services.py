@@ -65,9 +65,7 @@ class RosServices:
         response.result = self._outside.cloud_call(grant.run, request.service, request.arguments, request.timeout)
 
     def _send_mail(self, grant: Grant, request: Any, response: Any) -> None:
-        response.state = self._outside.send_mail(
-            grant.run, request.recipients, request.subject, request.body, request.attachment
-        )
+        response.state = self._outside.send_mail(grant.run, request.recipients, request.subject, request.body, request.attachment)
 
     def close(self) -> None:
         """Withdraw all services."""
