@@ -41,14 +41,14 @@ def to_dot(machine: Machine) -> str:
 
     A dot marks where it begins, bold circles where it ends, a dashed circle where every failure leads.
     """
-    lines = [f"digraph {_quoted(machine.name)} {{", "    rankdir=LR;", "    begin [shape=point];"]
+    lines = [f"digraph {_quoted(machine.name)} {{", "    rankdir=LR;", '    "[*]" [shape=point];']
     for name, state in machine.states.items():
         styles = ["bold"] * (name in machine.finals) + ["dashed"] * (name == machine.failure)
         shape = "doublecircle" if isinstance(state, Machine) else "circle"
         style = f', style="{",".join(styles)}"' if styles else ""
         label = _quoted(f"{name}\n{state.label}".strip())
         lines.append(f"    {_quoted(name)} [shape={shape}, label={label}{style}];")
-    lines.append(f"    begin -> {_quoted(machine.initial)};")
+    lines.append(f'    "[*]" -> {_quoted(machine.initial)};')
     for edge in machine.edges:
         label = f" [label={_quoted(edge.label)}]" if edge.label else ""
         lines.append(f"    {_quoted(edge.source)} -> {_quoted(edge.target)}{label};")

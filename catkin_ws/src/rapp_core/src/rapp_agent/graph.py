@@ -40,11 +40,11 @@ def _check_edges(name: str, edges: Sequence[Edge], finals: set[str]) -> None:
     """Each edge must be one that can be taken."""
     closed: dict[str, str] = {}
     for edge in edges:
+        never = f"cannot build machine {name}: the edge from {edge.source} to {edge.target} is never taken"
         if edge.source in finals:
-            raise GraphError(f"cannot build machine {name}: {edge.source} is final, so its edge to {edge.target} is never taken")
+            raise GraphError(f"{never}, for {edge.source} is final")
         if edge.source in closed:
-            earlier = f"the one to {closed[edge.source]} always is"
-            raise GraphError(f"cannot build machine {name}: the edge {edge.source} to {edge.target} is never taken, {earlier}")
+            raise GraphError(f"{never}, for the one to {closed[edge.source]} before it always is")
         if edge.when is always:
             closed[edge.source] = edge.target
 
