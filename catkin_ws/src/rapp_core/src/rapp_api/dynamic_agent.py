@@ -34,7 +34,9 @@ class DynamicAgent:
 
     def machine(self, open_channel: Callable[[], None], send_terminate: Callable[[Exception | None], None]) -> Machine:
         """The agent's FSM; an error in s2 or s3 leads to s4, and is reported by s5."""
-        task = self.task() or Machine("execute", {"execute": _doing("execute", self.execute)}, "execute", [], ["execute"])
+        task = self.task() or Machine(
+            "execute", {"execute": _doing("execute", self.execute)}, "execute", [], ["execute"], label="execute"
+        )
 
         def send(share: Subsystem) -> None:
             error = share.memory.get("error")
