@@ -19,7 +19,7 @@ Listener = Callable[[Block], None]
 _log = logging.getLogger(__name__)
 
 
-@dataclass
+@dataclass(eq=False)
 class Sounding:
     """Something that sounds; `done` is resolved with True at its end, with False when it was stopped."""
 
