@@ -1,14 +1,22 @@
-"""Calls that leave the robot: HOP services of the repository agent, and mail (deliverable section 4.2, paper Fig. 12)."""
+"""Calls that leave the robot: HOP services of the repository agent, and mail (deliverable section 4.2, paper Fig. 12).
 
+Each comes in two forms: the plain one returns at once, and calls back later from a thread of its own; `..._wait` waits.
+"""
+
+import logging
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from rapp_api.core_agent import current
-from rapp_api.errors import RappError
+from rapp_api.errors import RappError, Refused
 
 OnResult = Callable[[Any], None]
 OnError = Callable[[RappError], None]
+
+MOST_OPEN = 8  # asynchronous calls at a time
+_open = threading.BoundedSemaphore(MOST_OPEN)
+_log = logging.getLogger(__name__)
 
 
 def call_wait(service: str, args: dict[str, Any] | None = None, timeout: float = 0.0) -> Any:
@@ -16,30 +24,51 @@ def call_wait(service: str, args: dict[str, Any] | None = None, timeout: float =
     return current().cloud_call(service, args or {}, timeout)
 
 
-def call(service: str, args: dict[str, Any] | None, on_result: OnResult, on_error: OnError, timeout: float = 0.0) -> None:
-    """Call a HOP service asynchronously: just one of the callbacks is called, from a thread of its own."""
-    _later(lambda: call_wait(service, args, timeout), on_result, on_error)
+def call(
+    service: str,
+    args: dict[str, Any] | None = None,
+    on_result: OnResult | None = None,
+    on_error: OnError | None = None,
+    timeout: float = 0.0,
+) -> None:
+    """Call a HOP service asynchronously; one of the callbacks is called, once. Raises Refused when too many calls are open."""
+    _later(f"call {service}", lambda: call_wait(service, args, timeout), on_result, on_error)
 
 
 def send_mail_wait(recipients: Sequence[str], subject: str, body: str, attachment: str = "") -> str:
-    """Send a mail and wait: "delivered", or "kept" when it will be sent later. Raises RappError when it cannot be sent."""
+    """Send a mail and wait: "delivered", or "kept" when it will be sent later. Raises RappError when it cannot be sent.
+
+    `attachment` is the path of one of this run's recordings.
+    """
     return current().send_mail(list(recipients), subject, body, attachment)
 
 
 def send_mail(
-    recipients: Sequence[str], subject: str, body: str, attachment: str, on_result: OnResult, on_error: OnError
+    recipients: Sequence[str],
+    subject: str,
+    body: str,
+    attachment: str = "",
+    on_result: OnResult | None = None,
+    on_error: OnError | None = None,
 ) -> None:
-    """Send a mail asynchronously: just one of the callbacks is called, from a thread of its own."""
-    _later(lambda: send_mail_wait(recipients, subject, body, attachment), on_result, on_error)
+    """Send a mail asynchronously; one of the callbacks is called, once. Raises Refused when too many calls are open."""
+    _later("send a mail", lambda: send_mail_wait(recipients, subject, body, attachment), on_result, on_error)
 
 
-def _later(work: Callable[[], Any], on_result: OnResult, on_error: OnError) -> None:
+def _later(what: str, work: Callable[[], Any], on_result: OnResult | None, on_error: OnError | None) -> None:
+    """An error nobody asked to be told goes to the log."""
+    if not _open.acquire(blocking=False):
+        raise Refused(f"cannot {what}: {MOST_OPEN} calls are open already; wait for one to end")
+
     def run() -> None:
         try:
             result = work()
         except RappError as error:
-            on_error(error)
+            _open.release()
+            (on_error or (lambda unasked: _log.error("%s", unasked)))(error)
         else:
-            on_result(result)
+            _open.release()
+            if on_result is not None:
+                on_result(result)
 
-    threading.Thread(target=run, name="cloud call", daemon=True).start()
+    threading.Thread(target=run, name=what, daemon=True).start()

@@ -1,5 +1,6 @@
 """The core agent as a RApp sees it (port), and which one this process talks to."""
 
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
@@ -30,16 +31,28 @@ class CoreAgent(Protocol):
     def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
         """Send a mail; gives "delivered" or "kept"."""
 
+    def pause(self, seconds: float) -> None:
+        """Let time pass; the core agent is told that the dynamic agent means to wait."""
+
 
 class Activity:
-    """Counts what the dynamic agent's own loop does; the heartbeat carries the count, so that a standstill is seen."""
+    """Counts what the dynamic agent's own loop does; the heartbeat carries the count, so that a standstill is seen.
+
+    Only the loop's own thread counts: a thread beside it must not hide that the loop hangs.
+    """
 
     def __init__(self) -> None:
         self.count = 0
+        self._loop: int | None = None
+
+    def begin(self) -> None:
+        """Let the calling thread be the loop."""
+        self._loop = threading.get_ident()
 
     def moved(self) -> None:
-        """Count one step."""
-        self.count += 1
+        """Count one step of the loop, or one call it has finished."""
+        if threading.get_ident() == self._loop:
+            self.count += 1
 
 
 activity = Activity()

@@ -1,24 +1,35 @@
 """The core agent over ROS: persistent connections to its services, which carry the run's secret in their header."""
 
 import json
-from collections.abc import Sequence
+import select
+import socket
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any
 
+import genpy
 import rapp_msgs.srv
 import rospy
+from rospy.exceptions import ROSInternalException
 
 from rapp_api.core_agent import activity
-from rapp_api.errors import KINDS, Bug, Refused, Unreachable
+from rapp_api.errors import KINDS, Invalid, Refused, Unreachable
 
-CONNECT_TIMEOUT = 5.0  # s
+CONNECT_TIMEOUT = 5.0  # s for the service to appear at the ROS master
+ANSWER_TIMEOUT = 3600.0  # s; longer than any service takes: recording and listening end after 300 s
+PAUSE_STEP = 0.2  # s
 
 
 class RosCoreAgent:
     """See `core_agent.CoreAgent`. The secret came over this process's own channel: no other process can use it."""
 
-    def __init__(self, token: str) -> None:
+    def __init__(self, token: str, answer_timeout: float = ANSWER_TIMEOUT) -> None:
         self._header = {"rapp_channel": token}
-        self._proxies: dict[str, Any] = {}
+        self._answer_timeout = answer_timeout
+        self._idle: dict[str, list[Any]] = {}
+        self._lock = threading.Lock()
 
     def say(self, text: str, language: str) -> None:
         """See `CoreAgent`."""
@@ -44,31 +55,81 @@ class RosCoreAgent:
 
     def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float) -> Any:
         """See `CoreAgent`."""
-        fields = {"service": service, "arguments": json.dumps(arguments), "timeout": timeout}
-        return json.loads(self._call("rapp_cloud_call", "CloudCall", **fields).result)
+        try:
+            text = json.dumps(arguments, allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise Invalid(f"cannot call {service}: its arguments are not JSON: {error}; give texts, numbers, lists") from error
+        return json.loads(self._call("rapp_cloud_call", "CloudCall", service=service, arguments=text, timeout=timeout).result)
 
     def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
         """See `CoreAgent`."""
         fields = {"recipients": list(recipients), "subject": subject, "body": body, "attachment": attachment}
         return str(self._call("rapp_send_mail", "SendMail", **fields).state)
 
+    def pause(self, seconds: float) -> None:
+        """See `CoreAgent`."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            time.sleep(min(left, PAUSE_STEP))
+            activity.moved()
+
     def _call(self, name: str, srv: str, **fields: Any) -> Any:
-        response = self._answer(name, getattr(rapp_msgs.srv, srv), fields)
+        with _translated(name):
+            response = self._answer(name, getattr(rapp_msgs.srv, srv), fields)
         activity.moved()
         if not response.success:
             raise KINDS.get(getattr(response, "error", ""), Refused)(response.message)
         return response
 
     def _answer(self, name: str, cls: Any, fields: dict[str, Any]) -> Any:
-        """Call once; a connection that turns out dead before the call is opened once more."""
+        """Call over a connection of this call's own; afterwards it is free for the next, unless the call has failed.
+
+        What is asked is asked once: a mail must not be sent twice because its answer was lost.
+        """
+        proxy = self._free(name)
+        if proxy is None:
+            rospy.wait_for_service(name, CONNECT_TIMEOUT)
+            proxy = rospy.ServiceProxy(name, cls, persistent=True, headers=self._header)
+        bound = threading.Timer(self._answer_timeout, _break, [proxy])
+        bound.daemon = True
+        bound.start()
         try:
-            proxy = self._proxies.get(name)
-            if proxy is None:
-                rospy.wait_for_service(name, CONNECT_TIMEOUT)
-                proxy = self._proxies[name] = rospy.ServiceProxy(name, cls, persistent=True, headers=self._header)
-            return proxy(**fields)
-        except (rospy.ServiceException, rospy.ROSException, OSError) as error:
-            self._proxies.pop(name, None)
-            raise Unreachable(f"cannot reach the core agent's service {name}: {error}") from error
-        except (TypeError, ValueError, rospy.ROSSerializationException) as error:
-            raise Bug(f"cannot call {name}: {error}") from error
+            response = proxy(**fields)
+        except BaseException:
+            proxy.close()
+            raise
+        finally:
+            bound.cancel()
+        with self._lock:
+            self._idle.setdefault(name, []).append(proxy)
+        return response
+
+    def _free(self, name: str) -> Any:
+        """An idle connection that still stands; None when there is none, and one must be made."""
+        with self._lock:
+            idle = self._idle.get(name, [])
+            while idle:
+                proxy = idle.pop()
+                if not select.select([proxy.transport.socket], [], [], 0)[0]:
+                    return proxy
+                proxy.close()  # only its end can be there to read: a service speaks when it is asked
+        return None
+
+
+def _break(proxy: Any) -> None:
+    """Wake the thread that waits for the answer."""
+    transport = proxy.transport
+    if transport is not None:
+        with suppress(OSError):
+            transport.socket.shutdown(socket.SHUT_RDWR)
+
+
+@contextmanager
+def _translated(name: str) -> Iterator[None]:
+    """rospy's errors in our words."""
+    try:
+        yield
+    except (TypeError, genpy.SerializationError, rospy.ROSSerializationException) as error:
+        raise Invalid(f"cannot call {name}: {error}; give values of the types its description names") from error
+    except (rospy.ServiceException, rospy.ROSException, ROSInternalException, OSError) as error:
+        raise Unreachable(f"cannot reach the core agent's service {name}: {error}; try again later") from error

@@ -1,34 +1,57 @@
 """A core agent for a RApp author's tests: no robot, no ROS, a person who answers from a list.
 
-with FakeCoreAgent(hears=["Elizabeth"], services={"profile": {...}}) as core:
+with FakeCoreAgent(hears=["Elizabeth"], services={"profile": {...}}, package=Path("store/voice_mail")) as core:
     VoiceMail().run()
 assert ("say", "sending e-mail") in core.calls
 """
 
+import json
+import math
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rapp_api.core_agent import use
-from rapp_api.errors import RappError, Refused
+from rapp_api.errors import Invalid, RappError, Refused
 
 Service = Any | Callable[[dict[str, Any]], Any]
+RECORDINGS = "/recordings"
 
 
 class FakeCoreAgent:
-    """Implements `CoreAgent` in memory and notes every call in `calls` as (name, argument)."""
+    """Implements `CoreAgent` in memory, with the real one's limits, and notes every call in `calls` as (name, argument).
+
+    `hears` are the words the person says, one for each time the robot listens ("" for silence); `services` gives for each HOP
+    service its result, a function of its arguments, or the RappError it ends with; `mail` is "delivered", "kept" or a
+    RappError; with `package`, the folder of the RApp, calls that its package.json does not name are refused.
+    """
 
     def __init__(
         self,
         hears: Sequence[str] = (),
         services: Mapping[str, Service] | None = None,
         mail: str | RappError = "delivered",
+        package: Path | None = None,
     ) -> None:
         self.calls: list[tuple[str, Any]] = []
         self.mails: list[dict[str, Any]] = []
+        self.recordings: list[str] = []
+        self.parameters: dict[str, Any] = {}
         self._hears = list(hears)
         self._services = dict(services or {})
         self._mail = mail
+        self._package = package
+        self._core: frozenset[str] | None = None
+        self._cloud: frozenset[str] | None = None
         self._end: Callable[[], None] | None = None
+        if package is not None:
+            self._read(package)
+
+    def _read(self, package: Path) -> None:
+        rapp = json.loads((package / "package.json").read_text())["rapp"]
+        self.parameters = rapp.get("parameters", {})
+        self._core = frozenset(rapp["permissions"]["core"])
+        self._cloud = frozenset(rapp["permissions"]["cloud"])
 
     def __enter__(self) -> "FakeCoreAgent":
         self._end = use(self)
@@ -44,30 +67,51 @@ class FakeCoreAgent:
 
     def say(self, text: str, language: str) -> None:
         """Note the text."""
+        self._allow("rapp_say", self._core)
         self.calls.append(("say", text))
 
     def recognize(self, dictionary: Sequence[str], timeout: float) -> str:
         """The person's next word when it is in the dictionary, else "Empty"."""
+        self._allow("rapp_recognize", self._core)
+        _check(1 <= len(dictionary) <= 100 and all(word.strip() for word in dictionary), "listen: give 1 to 100 words")
         self.calls.append(("recognize", list(dictionary)))
         word = self._hears.pop(0) if self._hears else ""
         return next((known for known in dictionary if known.lower() == word.lower()), "Empty")
 
     def record(self, duration: float) -> str:
-        """A path."""
+        """The path of a recording."""
+        self._allow("rapp_record", self._core)
+        _check(0.1 <= duration <= 300, "record: 0.1 to 300 s are possible")
         self.calls.append(("record", duration))
-        return "/recordings/recording.ogg"
+        return self._recording("")
 
     def record_until_silence(self, path: str, waiting_time: float, microphone_energy: int) -> str:
-        """A path."""
+        """The path of a recording."""
+        self._allow("rapp_record_until_silence", self._core)
+        _check(0.1 <= waiting_time <= 60 and microphone_energy > 0, "record: 0.1 to 60 s and an energy above 0 are needed")
         self.calls.append(("record_until_silence", (path, waiting_time, microphone_energy)))
-        return f"/recordings/{path or 'recording.ogg'}"
+        return self._recording(path)
+
+    def _recording(self, wish: str) -> str:
+        path = f"{RECORDINGS}/{wish or f'recording-{len(self.recordings) + 1}.ogg'}"
+        _check(path.endswith(".ogg") and ".." not in path and not wish.startswith("/"), f"record into {wish}: name it x.ogg")
+        self.recordings.append(path)
+        return path
 
     def play_audio(self, path: str, position: float, volume: float, balance: float, loop: bool) -> None:
-        """Note the path."""
+        """Note the path: of one of this run's recordings, or of a file in the package (in the sandbox: /rapp/package/...)."""
+        self._allow("rapp_play_audio", self._core)
+        _check(math.isfinite(position) and position >= 0, "play: position must be 0 or more")
+        _check(0 <= volume <= 1 and -1 <= balance <= 1, "play: volume is 0 to 1, balance -1 to 1")
+        own = self._package is not None and Path(path).is_relative_to("/rapp/package")
+        own = own and (Path(str(self._package)) / Path(path).relative_to("/rapp/package")).is_file()
+        _check(own or path in self.recordings, f"read {path}: give a file of the package or a recording")
         self.calls.append(("play_audio", path))
 
     def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float) -> Any:
-        """What `services` says; an error there is raised."""
+        """What `services` says."""
+        self._allow(service, self._cloud)
+        arguments = json.loads(_json(service, arguments))
         self.calls.append(("cloud_call", service))
         if service not in self._services:
             raise Refused(f"cannot call {service}: it is not among this test's services")
@@ -78,8 +122,32 @@ class FakeCoreAgent:
 
     def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
         """Note the mail; answer what `mail` says."""
+        self._allow("send_mail", self._cloud)
+        if attachment and attachment not in self.recordings:
+            raise Refused(f"cannot attach {attachment}: only recordings of this run may leave the robot")
         self.calls.append(("send_mail", list(recipients)))
         self.mails.append({"recipients": list(recipients), "subject": subject, "body": body, "attachment": attachment})
         if isinstance(self._mail, RappError):
             raise self._mail
         return self._mail
+
+    def pause(self, seconds: float) -> None:
+        """Note it; no time passes."""
+        self.calls.append(("pause", seconds))
+
+    @staticmethod
+    def _allow(name: str, permitted: frozenset[str] | None) -> None:
+        if permitted is not None and name not in permitted:
+            raise Refused(f"cannot call {name}: the RApp's package.json does not name it under permissions")
+
+
+def _check(right: bool, what: str) -> None:
+    if not right:
+        raise Invalid(f"cannot {what}")
+
+
+def _json(service: str, arguments: dict[str, Any]) -> str:
+    try:
+        return json.dumps(arguments, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise Invalid(f"cannot call {service}: its arguments are not JSON: {error}; give texts, numbers, lists") from error
