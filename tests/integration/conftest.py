@@ -73,21 +73,55 @@ def _wait_ready(process: subprocess.Popen[str], log: Path) -> dict[str, Any]:
     raise AssertionError(f"{process.args} did not become ready:\n{log.read_text()[-3000:]}")
 
 
+class RosMaster:
+    """A real ROS master, which can be killed, frozen, and started again at the same address."""
+
+    def __init__(self, folder: Path) -> None:
+        self._port = free_port()
+        self._folder = folder
+        self.uri = f"http://127.0.0.1:{self._port}"
+        self.env = {**os.environ, "ROS_LOG_DIR": str(folder), "ROS_MASTER_URI": self.uri, "ROS_IP": "127.0.0.1"}
+
+    def start(self) -> None:
+        """Start it; returns when it listens."""
+        with (self._folder / "rosmaster.log").open("a") as log:
+            words = ["rosmaster", "--core", "-p", str(self._port)]
+            self._process = subprocess.Popen(words, env=self.env, stdout=log, stderr=log)
+        _wait_port(self._port)
+
+    def signal(self, number: int) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    def stop(self) -> None:
+        """End and reap it, even a frozen one."""
+        self._process.terminate()
+        self._process.send_signal(signal.SIGCONT)
+        self._process.wait(STOP_TIMEOUT)
+
+
+@contextmanager
+def _running_master(folder: Path) -> Iterator[RosMaster]:
+    master = RosMaster(folder)
+    master.start()
+    try:
+        yield master
+    finally:
+        master.stop()
+
+
 @pytest.fixture(scope="session")
 def roscore(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """URI of a real ROS master of this test session's own."""
-    folder = tmp_path_factory.mktemp("roscore")
-    port = free_port()
-    uri = f"http://127.0.0.1:{port}"
-    env = {**os.environ, "ROS_LOG_DIR": str(folder), "ROS_MASTER_URI": uri, "ROS_IP": "127.0.0.1"}
-    with (folder / "rosmaster.log").open("w") as log:
-        process = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], env=env, stdout=log, stderr=log)
-    try:
-        _wait_port(port)
-        yield uri
-    finally:
-        process.terminate()
-        process.wait(STOP_TIMEOUT)
+    with _running_master(tmp_path_factory.mktemp("roscore")) as master:
+        yield master.uri
+
+
+@pytest.fixture
+def own_master(tmp_path: Path) -> Iterator[RosMaster]:
+    """A ROS master of one test's own, to be killed or frozen."""
+    with _running_master(tmp_path) as master:
+        yield master
 
 
 def _wait_port(port: int) -> None:

@@ -21,6 +21,7 @@ from rapp_bridge.offers import Offers
 from rapp_bridge.ros import Ros
 from rapp_bridge.server import Hall, application
 from rapp_bridge.topics import Topics
+from rapp_ros.rejoin import Rejoining
 
 BACKLOG = 128  # callers that may connect to a client's service at once; rospy's own 5 makes the sixth wait 1 s
 THREADS = 8  # for what asks the master
@@ -80,8 +81,10 @@ async def _serve_joined(config: Config, blocking: Blocking, stop: asyncio.Event)
     server = HTTPServer(application(hall))
     server.add_sockets(sockets)
     sweeping = asyncio.create_task(_sweep(topics, blocking))
+    rejoining = Rejoining()
     print("READY " + json.dumps({"port": sockets[0].getsockname()[1]}), flush=True)
     await stop.wait()
+    rejoining.close()
     server.stop()
     sweeping.cancel()
     offers.close()

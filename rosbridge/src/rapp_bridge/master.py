@@ -1,22 +1,10 @@
-"""Questions to the ROS master that end in bounded time."""
+"""Questions to the ROS master, as far as the bridge has any."""
 
-import http.client
-import xmlrpc.client
 from typing import Any
 from urllib.parse import urlsplit
 
 from rapp_bridge.errors import Unreachable
-
-
-class _Timed(xmlrpc.client.Transport):
-    def __init__(self, timeout: float) -> None:
-        super().__init__()
-        self._timeout = timeout
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        connection = super().make_connection(host)
-        connection.timeout = self._timeout
-        return connection
+from rapp_ros.master import MasterAwayError, ask
 
 
 class Master:
@@ -46,8 +34,6 @@ class Master:
 
     def _ask(self, question: str, *words: str) -> tuple[int, str, Any]:
         try:
-            with xmlrpc.client.ServerProxy(self._uri, transport=_Timed(self._timeout)) as server:
-                code, text, value = getattr(server, question)(self._caller, *words)
-        except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
-            raise Unreachable(f"cannot ask the ROS master: {error}; see that roscore runs") from error
-        return code, text, value
+            return ask(self._uri, self._timeout, question, self._caller, *words)
+        except MasterAwayError as error:
+            raise Unreachable(str(error)) from error

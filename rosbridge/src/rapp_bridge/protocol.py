@@ -192,9 +192,7 @@ class _Reader:
 
 
 _DECODERS: dict[str, Callable[[_Reader], Message]] = {
-    "advertise": lambda r: Advertise(
-        r.name("topic"), r.text("type"), r.id(), r.flag("latch", False), r.count("queue_size", 100)
-    ),
+    "advertise": lambda r: Advertise(r.name("topic"), r.text("type"), r.id(), r.flag("latch", False), r.count("queue_size", 100)),
     "unadvertise": lambda r: Unadvertise(r.name("topic"), r.id()),
     "publish": lambda r: Publish(r.name("topic"), r.object("msg"), r.id()),
     "subscribe": lambda r: Subscribe(

@@ -195,3 +195,10 @@ def test_without_a_master_it_waits_and_can_be_ended(ros_env, tmp_path):
         assert "cannot reach the ROS master" in process.stderr.readline()
         process.terminate()
         assert process.wait(10) == 0
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+def test_it_ends_whatever_the_ros_master_does(start, own_master, tmp_path, frozen):
+    core = start("rapp_core", "--robot", "tcp://127.0.0.1:1", "--home", str(tmp_path / "home"), env=own_master.env)
+    own_master.signal(signal.SIGSTOP if frozen else signal.SIGKILL)
+    assert core.stop() == 0

@@ -28,6 +28,7 @@ from rapp_core.services.context import Context
 from rapp_core.services.executor import Executor
 from rapp_core.services.outside import Outside
 from rapp_core.trace import Trace
+from rapp_ros.rejoin import Rejoining
 
 _log = logging.getLogger(__name__)
 
@@ -48,9 +49,15 @@ def main() -> int:
     try:
         if join("core_agent", stop):
             _run(config, launcher, stop)
-            leave()
+        farewell = leave()
+    except CoreError as error:
+        _log.error("%s", error)
+        return 1
     finally:
         launcher.close()
+    if not farewell:
+        _log.warning("the ROS master does not take the farewell; leaving without")
+        os._exit(0)  # rospy's own exit handler would wait for the master without bound
     return 0
 
 
@@ -62,8 +69,8 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     executor, hop = Executor(Context(nao, config, trace, config.home / "listening")), RosHop(stop)
     platform = Platform(hop, config, trace)
     control = Control(Parts(nao, hop, launcher, executor, platform, lease, trace, config, stop))
-    services = RosServices(executor, Outside(hop, config, trace), lease, trace)
-    machine = core_machine(control)
+    RosServices(executor, Outside(hop, config, trace), lease, trace)
+    machine, rejoining = core_machine(control), Rejoining()
     machine.listen(trace.core_event)
     threading.Thread(target=_hush_at_end, args=(nao.voice, stop), name="hush", daemon=True).start()
     print("READY " + json.dumps({"node": rospy.get_name()}), flush=True)
@@ -73,10 +80,9 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
             machine.step(share)
     finally:
         stop.set()
+        rejoining.close()
         control.close()
         platform.close()
-        services.close()
-        hop.close()
         states.close()
         connection.close()
 

@@ -32,10 +32,8 @@ class RosHop:
         self._jobs: dict[str, queue.Queue[Any]] = {}
         self._alive = float("-inf")
         self._cancel = rospy.Publisher("rapp_hop/cancel", String, queue_size=10)
-        self._subscribers = [
-            rospy.Subscriber("rapp_hop/events", HopEvent, self._take, queue_size=1000, tcp_nodelay=True),
-            rospy.Subscriber("rapp_hop/alive", String, self._sign_of_life, queue_size=10, tcp_nodelay=True),
-        ]
+        self._events = rospy.Subscriber("rapp_hop/events", HopEvent, self._take, queue_size=1000, tcp_nodelay=True)
+        rospy.Subscriber("rapp_hop/alive", String, self._sign_of_life, queue_size=10, tcp_nodelay=True)
 
     @property
     def present(self) -> bool:
@@ -44,7 +42,7 @@ class RosHop:
 
     def _reachable(self) -> bool:
         """Whether the link is there and its events would arrive: each topic is connected by itself."""
-        return self.present and self._subscribers[0].get_num_connections() > 0
+        return self.present and self._events.get_num_connections() > 0
 
     def request(self, name: str, arguments: Mapping[str, Any], timeout: float, progress: Progress | None = None) -> Any:
         """See `ports.Hop`."""
@@ -115,12 +113,6 @@ class RosHop:
 
     def _sign_of_life(self, _message: Any) -> None:
         self._alive = time.monotonic()
-
-    def close(self) -> None:
-        """Leave the topics."""
-        for subscriber in self._subscribers:
-            subscriber.unregister()
-        self._cancel.unregister()
 
 
 def _result(name: str, text: str) -> Any:

@@ -1,14 +1,18 @@
 """Joining ROS: bounded, logging left alone."""
 
 import logging
+import queue
 import sys
 import threading
 
 import rosgraph
 import rospy
 
+from rapp_core.errors import Unreachable
+
 _log = logging.getLogger(__name__)
-AGAIN = 0.5  # s between tries while there is no master
+STEP = 0.05  # s between two looks
+FAREWELL = 1.0  # s
 FORMAT = "%(asctime)s %(name)s %(levelname)s %(message)s"
 
 
@@ -18,19 +22,34 @@ def log_to_stderr() -> None:
 
 
 def join(name: str, stop: threading.Event) -> bool:
-    """Become a node once there is a master; gives False when `stop` was set before that."""
-    warned = False
-    while not rosgraph.is_master_online():
-        if not warned:
-            _log.warning("cannot reach the ROS master at %s: waiting for it; start roscore", rosgraph.get_master_uri())
-            warned = True
-        if stop.wait(AGAIN):
-            return False
-    rospy.init_node(name, disable_signals=True, disable_rosout=True)
-    log_to_stderr()
-    return True
+    """Become a node once there is a master; gives False when `stop` was set before that. Raises Unreachable."""
+    outcome: queue.SimpleQueue[rospy.ROSException | None] = queue.SimpleQueue()
+    threading.Thread(target=_enter, args=(name, outcome), name="join", daemon=True).start()
+    while not stop.is_set():
+        try:
+            error = outcome.get(timeout=STEP)
+        except queue.Empty:
+            continue
+        if error is not None:
+            raise Unreachable(f"cannot join ROS: {error}; see ROS_MASTER_URI and ROS_IP") from error
+        log_to_stderr()
+        return True
+    return False
 
 
-def leave() -> None:
-    """Withdraw the node from the master."""
-    rospy.signal_shutdown("the core agent ends")
+def _enter(name: str, outcome: "queue.SimpleQueue[rospy.ROSException | None]") -> None:
+    if not rosgraph.is_master_online():
+        _log.warning("cannot reach the ROS master at %s: waiting for it; start roscore", rosgraph.get_master_uri())
+    try:
+        rospy.init_node(name, disable_signals=True, disable_rosout=True)
+        outcome.put(None)
+    except rospy.ROSException as error:
+        outcome.put(error)
+
+
+def leave() -> bool:
+    """Withdraw the node from the master; gives False when the master does not take the farewell in time."""
+    leaving = threading.Thread(target=rospy.signal_shutdown, args=("the core agent ends",), name="leave", daemon=True)
+    leaving.start()
+    leaving.join(FAREWELL)
+    return not leaving.is_alive()

@@ -20,18 +20,19 @@ OUTSIDE = frozenset({"rapp_cloud_call", "rapp_send_mail"})  # allowed call by ca
 
 
 class RosServices:
-    """Advertises all services; `close` withdraws them."""
+    """Advertises all services; they are withdrawn when the node leaves."""
 
     def __init__(self, executor: Executor, outside: Outside, lease: Lease, trace: Trace) -> None:
         self._executor = executor
         self._outside = outside
         self._lease = lease
         self._trace = trace
-        self._services = [self._offer(row.name, row.srv, self._core(row)) for row in CORE_SERVICES]
-        self._services.append(self._offer("rapp_cloud_call", "CloudCall", self._cloud_call))
-        self._services.append(self._offer("rapp_send_mail", "SendMail", self._send_mail))
+        for row in CORE_SERVICES:
+            self._offer(row.name, row.srv, self._core(row))
+        self._offer("rapp_cloud_call", "CloudCall", self._cloud_call)
+        self._offer("rapp_send_mail", "SendMail", self._send_mail)
 
-    def _offer(self, name: str, srv: str, handler: Handler) -> Any:
+    def _offer(self, name: str, srv: str, handler: Handler) -> None:
         cls = getattr(rapp_msgs.srv, srv)
 
         def serve(request: Any) -> Any:
@@ -51,7 +52,7 @@ class RosServices:
             self._trace.message(f"core->dynamic reply {name}")
             return response
 
-        return rospy.Service(name, cls, serve)
+        rospy.Service(name, cls, serve)
 
     def _core(self, row: CoreService) -> Handler:
         def execute(grant: Grant, request: Any, response: Any) -> None:
@@ -66,11 +67,6 @@ class RosServices:
 
     def _send_mail(self, grant: Grant, request: Any, response: Any) -> None:
         response.state = self._outside.send_mail(grant.run, request.recipients, request.subject, request.body, request.attachment)
-
-    def close(self) -> None:
-        """Withdraw all services."""
-        for service in self._services:
-            service.shutdown("the core agent ends")
 
 
 def _allow(grant: Grant, name: str) -> None:
