@@ -6,12 +6,19 @@ import os
 import signal
 import sys
 import threading
+from contextlib import closing
 
 os.environ.setdefault("QI_LOG_LEVEL", "1")  # libqi logs on stdout otherwise; read when it is loaded
 os.environ.setdefault("QI_EVENTLOOP_MIN_THREADS", "8")
 
 from rapp_nao_sim.config import read
+from rapp_nao_sim.errors import SimError
 from rapp_nao_sim.host import Host
+from rapp_nao_sim.world.errors import WorldError
+
+LOOK = 0.5  # s between two looks at the simulator's processes
+
+_log = logging.getLogger("nao_sim")
 
 
 def main() -> int:
@@ -21,21 +28,14 @@ def main() -> int:
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    world = None
-    if config.world:
-        from rapp_nao_sim.world.process import WorldClient
-
-        world = WorldClient()
-        world.start()
-    host = Host(config, world)
     try:
-        print("READY " + json.dumps({"port": host.start()}), flush=True)
-        while not stop.wait(1.0):
-            pass
-    finally:
-        host.close()
-        if world is not None:
-            world.close()
+        with closing(Host(config)) as host:
+            print("READY " + json.dumps({"port": host.start()}), flush=True)
+            while not stop.wait(LOOK):
+                host.look_after()
+    except (SimError, WorldError) as error:
+        _log.error("%s", error)
+        return 1
     return 0
 
 

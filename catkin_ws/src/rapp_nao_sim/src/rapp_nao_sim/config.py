@@ -28,11 +28,11 @@ def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
     default = Config()
     parser = argparse.ArgumentParser(prog="nao_sim", description="a simulated NAO behind NAOqi's qi protocol")
     parser.add_argument("--address", default=default.address, help="where to listen (%(default)s)")
-    parser.add_argument("--port", type=int, default=int(env.get("RAPP_NAO_PORT", default.port)), help="0: any free one")
+    parser.add_argument("--port", type=_port, default=env.get("RAPP_NAO_PORT", str(default.port)), help="0: any free one")
     parser.add_argument("--microphone", choices=("sound", "text"), default=default.microphone)
     parser.add_argument("--voice", choices=("espeak", "silent"), default=default.voice)
     parser.add_argument("--files", type=Path, action="append", help="a folder where clients may write (repeatable)")
-    parser.add_argument("--ambient", type=float, default=default.ambient, help="noise floor, RMS of 16-bit samples")
+    parser.add_argument("--ambient", type=_level, default=default.ambient, help="noise floor, RMS of 16-bit samples")
     parser.add_argument("--no-world", action="store_true", help="voice and ears only, no body in a room")
     options = parser.parse_args(words)
     return Config(
@@ -44,3 +44,18 @@ def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
         ambient=options.ambient,
         world=not options.no_world,
     )
+
+
+def _port(word: str) -> int:
+    """A TCP port; argparse makes a clear error of a ValueError."""
+    port = int(word)
+    if not 0 <= port < 65536:
+        raise argparse.ArgumentTypeError(f"{port} is no port: give 0 to 65535")
+    return port
+
+
+def _level(word: str) -> float:
+    level = float(word)
+    if not 0 <= level <= 16_000:
+        raise argparse.ArgumentTypeError(f"{word} is no noise floor: give 0 to 16000")
+    return level

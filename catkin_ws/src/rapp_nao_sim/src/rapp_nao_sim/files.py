@@ -19,4 +19,6 @@ class Files:
             raise NaoqiError(f"cannot write {name}: outside {', '.join(map(str, self._folders))}")
         if not path.parent.is_dir():
             raise NaoqiError(f"cannot write {name}: its folder does not exist")
+        if path.is_dir():
+            raise NaoqiError(f"cannot write {name}: it is a folder")
         return path

@@ -2,75 +2,99 @@
 
 import logging
 import threading
+from contextlib import ExitStack
 from typing import Any
 
 import qi
 
 from rapp_nao_sim.config import Config
+from rapp_nao_sim.errors import StartError
 from rapp_nao_sim.files import Files
-from rapp_nao_sim.modules.audio import ALAudioDevice, ALAudioPlayer, ALAudioRecorder
+from rapp_nao_sim.modules.audio_device import ALAudioDevice
+from rapp_nao_sim.modules.audio_player import ALAudioPlayer
+from rapp_nao_sim.modules.audio_recorder import ALAudioRecorder
 from rapp_nao_sim.modules.memory import ALMemory
 from rapp_nao_sim.modules.sim_world import SimWorld
-from rapp_nao_sim.modules.speech_recognition import ALSoundDetection, ALSpeechRecognition, Hearing
-from rapp_nao_sim.modules.text_to_speech import ALTextToSpeech, Mouth
+from rapp_nao_sim.modules.speech_recognition import ALSoundDetection, ALSpeechRecognition
+from rapp_nao_sim.modules.text_to_speech import ALTextToSpeech
 from rapp_nao_sim.sound.room import Mixer, Room
+from rapp_nao_sim.speech.hearing import Hearing
+from rapp_nao_sim.speech.mouth import Mouth
 from rapp_nao_sim.speech.process import Ears
+from rapp_nao_sim.world.motion_modules import modules as motion_modules
+from rapp_nao_sim.world.process import WorldClient
 
 _log = logging.getLogger(__name__)
 
 
 class Host:
-    """The running simulator; `close` undoes `start` in reverse order."""
+    """The running simulator; `close` undoes `start` in reverse order, however far that came."""
 
-    def __init__(self, config: Config, world: Any) -> None:
+    def __init__(self, config: Config) -> None:
         self._config = config
-        self._world = world
+        self._undo = ExitStack()
         self._session = qi.Session()
+        self._world = WorldClient() if config.world else None
         self._ears = Ears() if config.microphone == "sound" else None
         self._mixer = Mixer(config.ambient)
         self._room = Room(self._mixer)
-        self._speaking = threading.Event()
         self._memory = ALMemory(self._session.service)
-        self._hearing = Hearing(self._memory, self._ears, self._speaking)
+        speaking = threading.Event()
+        self._hearing = Hearing(self._memory.insertData, self._memory.raiseEvent, self._ears, speaking)
+        self._sim_world = SimWorld(self._mixer, self._hearing, config.person_level, self._ears is None, self._world)
+        self._mouth = Mouth(self._mixer, self._memory.raiseEvent, self._sim_world.robotSaid, speaking, config.voice == "silent")
 
     def start(self) -> int:
-        """Start everything; gives the port of NAOqi."""
+        """Start everything; gives the port of NAOqi. Raises StartError, WorldError."""
+        config, undo = self._config, self._undo
+        if self._world is not None:
+            self._world.start()
+            undo.callback(self._world.close)
+        self._listen()
+        undo.callback(self._session.close)
+        for part in (self._hearing, self._mouth, self._room):
+            part.start()
+            undo.callback(part.close)
         if self._ears is not None:
             self._ears.start()
-        self._session.listenStandalone(f"tcp://{self._config.address}:{self._config.port}")
+            undo.callback(self._ears.close)
+        self._room.listen(self._hearing.feed)
         for name, module in self._modules().items():
             self._session.registerService(name, module)
-        self._room.listen(self._hearing.feed)
-        self._room.start()
+        _log.info("a NAO is simulated at %s, voice %s, microphone %s", self._session.url(), config.voice, config.microphone)
         return int(str(self._session.url()).rsplit(":", 1)[1])
+
+    def _listen(self) -> None:
+        place = f"{self._config.address}:{self._config.port}"
+        try:
+            self._session.listenStandalone(f"tcp://{place}")
+        except RuntimeError as error:
+            reason = " ".join(str(error).split())
+            if "already in use" in reason:
+                reason = "another program listens there; end it, or choose another --port (0: any free one)"
+            raise StartError(f"cannot listen on {place}: {reason}") from error
 
     def _modules(self) -> dict[str, Any]:
         config, mixer = self._config, self._mixer
-        text_fed = config.microphone == "text"
-        sim_world = SimWorld(mixer, self._hearing, config.person_level, text_fed, self._world)
-        mouth = Mouth(
-            mixer, self._memory, config.robot_voice, config.echo, config.voice == "silent", sim_world.robotSaid, self._speaking
-        )
         modules = {
             "ALMemory": self._memory,
-            "ALTextToSpeech": ALTextToSpeech(mouth),
+            "ALTextToSpeech": ALTextToSpeech(self._mouth, config.robot_voice, config.echo),
             "ALSpeechRecognition": ALSpeechRecognition(self._hearing),
             "ALSoundDetection": ALSoundDetection(self._hearing),
             "ALAudioRecorder": ALAudioRecorder(self._room, Files(config.files)),
             "ALAudioDevice": ALAudioDevice(self._room, self._session.service),
             "ALAudioPlayer": ALAudioPlayer(mixer, config.echo),
-            "SimWorld": sim_world,
+            "SimWorld": self._sim_world,
         }
-        if self._world is not None:
-            from rapp_nao_sim.world.motion_modules import modules as motion
+        return modules | (motion_modules(self._world) if self._world is not None else {})
 
-            modules |= motion(self._world)
-        return modules
+    def look_after(self) -> None:
+        """Start ears that have died anew. Raises StartError when the body has died: the robot cannot go on without."""
+        if self._ears is not None:
+            self._ears.revive()
+        if self._world is not None and not self._world.alive():
+            raise StartError("cannot go on: the process of the robot's body has died; start nao_sim again")
 
     def close(self) -> None:
         """Stop everything."""
-        self._room.close()
-        self._hearing.close()
-        self._session.close()
-        if self._ears is not None:
-            self._ears.close()
+        self._undo.close()

@@ -3,15 +3,21 @@
 import logging
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 import qi
 
+from rapp_nao_sim.errors import SimError
+from rapp_nao_sim.world.errors import WorldError
+
 _log = logging.getLogger(__name__)
 _running = threading.BoundedSemaphore(100)  # calls at work at once; more are refused rather than piled up
+# What a client is told in its own words; arguments of a wrong type are among it.
+_TOLD = (SimError, WorldError, TypeError, ValueError)
 
 
-class NaoqiError(RuntimeError):
+class NaoqiError(SimError):
     """A call cannot be done; the client gets the text below the method's name."""
 
 
@@ -20,31 +26,70 @@ def working(method: Callable[..., Any]) -> Callable[..., Any]:
 
     def call(self: Any, *args: Any) -> Any:
         promise = qi.Promise()
-        name = f"{type(self).__name__}::{method.__name__}"
+        name = _name(self, method)
         if not _running.acquire(blocking=False):
             promise.setError(f"{name}\n\ttoo many calls at once")
             return promise.future()
         threading.Thread(target=_work, args=(promise, name, method, self, args), daemon=True, name=name).start()
         return promise.future()
 
-    # Not functools.wraps: libqi would read the wrapped signature and refuse calls that leave out arguments with defaults.
-    call.__name__ = method.__name__
-    call.__doc__ = method.__doc__
-    return call
+    return _named(call, method)
+
+
+def quick(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Make the errors of a module's method that returns at once arrive as NAOqi's: without Python's traceback."""
+
+    def call(self: Any, *args: Any) -> Any:
+        try:
+            return method(self, *args)
+        except _TOLD as error:
+            promise = qi.Promise()
+            promise.setError(_text(_name(self, method), error))
+            return promise.future()
+
+    return _named(call, method)
+
+
+def promised(name: str, future: "Future[Any]") -> Any:
+    """libqi's future of a call `name` that ends, without a value, when a future of ours does."""
+    promise = qi.Promise()
+
+    def tell(done: "Future[Any]") -> None:
+        error = done.exception()
+        if error is None:
+            promise.setValue(None)
+        else:
+            promise.setError(_text(name, error))
+
+    future.add_done_callback(tell)
+    return promise.future()
 
 
 def _work(promise: Any, name: str, method: Callable[..., Any], module: Any, args: tuple[Any, ...]) -> None:
     try:
         promise.setValue(method(module, *args))
-    except NaoqiError as error:
-        promise.setError(f"{name}\n\t{error}")
-    except TypeError as error:
-        promise.setError(f"{name}\n\t{error}")
-    except Exception:  # noqa: BLE001 - logged here, and told to the client, who must not wait for ever
-        _log.exception("%s failed", name)
-        promise.setError(f"{name}\n\tinternal error of the simulator; see its log")
+    except Exception as error:  # noqa: BLE001 - told to the client, who must not wait for ever
+        promise.setError(_text(name, error))
     finally:
         _running.release()
+
+
+def _text(name: str, error: BaseException) -> str:
+    if isinstance(error, _TOLD):
+        return f"{name}\n\t{error}"
+    _log.error("%s failed", name, exc_info=error)
+    return f"{name}\n\tinternal error of the simulator; see its log"
+
+
+def _name(module: Any, method: Callable[..., Any]) -> str:
+    return f"{type(module).__name__}::{method.__name__}"
+
+
+def _named(call: Callable[..., Any], method: Callable[..., Any]) -> Callable[..., Any]:
+    # Not functools.wraps: libqi would read the wrapped signature and refuse calls that leave out arguments with defaults.
+    call.__name__ = method.__name__
+    call.__doc__ = method.__doc__
+    return call
 
 
 class Module:

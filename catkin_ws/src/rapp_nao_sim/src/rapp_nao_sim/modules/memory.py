@@ -7,7 +7,7 @@ from typing import Any
 
 import qi
 
-from rapp_nao_sim.naoqi import Module, NaoqiError
+from rapp_nao_sim.naoqi import Module, NaoqiError, quick
 
 _log = logging.getLogger(__name__)
 Fetch = Callable[[str], Any]
@@ -31,11 +31,12 @@ class ALMemory(Module):
         self.__subscribers: dict[str, Subscriber] = {}
         self.__modules: dict[str, dict[str, str]] = {}
 
+    @quick
     def getData(self, key: str) -> Any:  # noqa: N802
         """The value of a key; an error when nobody has set it."""
         with self.__lock:
             if key not in self.__values:
-                raise NaoqiError(f"ALMemory::getData\n\tdata not found: {key}")
+                raise NaoqiError(f"data not found: {key}")
             return self.__values[key]
 
     def insertData(self, key: str, value: Any) -> None:  # noqa: N802
@@ -80,11 +81,12 @@ class ALMemory(Module):
         with self.__lock:
             self.__modules.setdefault(key, {})[module] = rest[-1]
 
+    @quick
     def unsubscribeToEvent(self, key: str, module: str) -> None:  # noqa: N802
         """End subscribeToEvent; an error when there was none."""
         with self.__lock:
             if self.__modules.get(key, {}).pop(module, None) is None:
-                raise NaoqiError(f"ALMemory::unsubscribeToEvent\n\t{module} is not subscribed to {key}")
+                raise NaoqiError(f"{module} is not subscribed to {key}")
 
     def __tell(self, module: str, method: str, key: str, value: Any) -> None:
         try:

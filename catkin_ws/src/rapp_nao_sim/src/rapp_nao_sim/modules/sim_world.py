@@ -1,31 +1,34 @@
 """SimWorld, the simulator's own module: people who speak in the room, its noise, its picture."""
 
-import threading
 from pathlib import Path
-from typing import Any
 
 import qi
-import soundfile
 
-from rapp_nao_sim.modules.speech_recognition import Hearing
-from rapp_nao_sim.naoqi import Module, NaoqiError, working
+from rapp_nao_sim.naoqi import Module, NaoqiError, quick, working
 from rapp_nao_sim.sound.room import Mixer, Sounding
-from rapp_nao_sim.sound.synthesis import RATE, VoiceError, resample, speak
+from rapp_nao_sim.sound.samples import load
+from rapp_nao_sim.sound.synthesis import speak
+from rapp_nao_sim.speech.hearing import Hearing
+from rapp_nao_sim.world.process import WorldClient
+
+LOUDEST = 16_000.0  # RMS of 16-bit samples; more noise would be cut off at full scale
 
 
 @qi.multiThreaded()
 class SimWorld(Module):
-    """What happens in the room beside the robot. Signals: `robotSaid(text)`, `personSpoke(text)`."""
+    """What happens in the room beside the robot. Signals: `robotSaid(text)`, `personSpoke(text)`.
 
-    def __init__(self, mixer: Mixer, hearing: Hearing, level: float, text_fed: bool, world: Any) -> None:
+    Calls overlap: what two people say at once is mixed at the microphone.
+    """
+
+    def __init__(self, mixer: Mixer, hearing: Hearing, level: float, text_fed: bool, world: WorldClient | None) -> None:
         self.robotSaid = qi.Signal("(s)")
         self.personSpoke = qi.Signal("(s)")
         self.__mixer = mixer
         self.__hearing = hearing
         self.__level = level
         self.__text_fed = text_fed
-        self.__world = [world]
-        self.__turn = threading.Lock()
+        self.__world = world
 
     @working
     def personSay(self, text: str, voice: str, options: dict[str, float] | None = None) -> None:  # noqa: N802
@@ -34,40 +37,38 @@ class SimWorld(Module):
         Options: "speed" in words per minute (150), "level" from 0 to 1. With the text-fed microphone the words reach the ears
         at once, and the sound sounds on without being waited for.
         """
-        wishes = options or {}
-        try:
-            samples = speak(text, voice, int(wishes.get("speed", 150)))
-        except VoiceError as error:
-            raise NaoqiError(str(error)) from error
-        sounding = Sounding(samples, float(wishes.get("level", self.__level)))
+        wishes = {"speed": 150.0, "level": self.__level, **(options or {})}
+        samples = speak(text, voice, int(wishes["speed"]))
+        sounding = self.__mixer.add(Sounding(samples, float(wishes["level"])))
         if self.__text_fed:
-            self.__mixer.add(sounding)
             self.__hearing.feed_text(text)
         else:
-            self.__sound(sounding)
+            sounding.done.result()
         self.personSpoke(text)
 
     @working
     def personPlay(self, name: str) -> None:  # noqa: N802
         """A recording of a person sounds in the room; ends at its end."""
-        if not Path(name).is_file():
-            raise NaoqiError(f"cannot play {name}: there is no such file")
-        samples, rate = soundfile.read(name, dtype="float64", always_2d=True)
-        self.__sound(Sounding(resample(samples.mean(axis=1), rate, RATE), 1.0))
+        self.__mixer.add(Sounding(load(Path(name)), 1.0)).done.result()
 
-    def __sound(self, sounding: Sounding) -> None:
-        with self.__turn:
-            self.__mixer.add(sounding).done.result()
-
+    @quick
     def micText(self, text: str) -> None:  # noqa: N802
         """Words for the text-fed microphone, without any sound."""
         if not self.__text_fed:
-            raise NaoqiError("SimWorld::micText\n\tthe microphone hears sound; start nao_sim with --microphone text")
-        self.__hearing.feed_text(text)
+            raise NaoqiError("the microphone hears sound; start nao_sim with --microphone text")
+        self.__hearing.feed_text(str(text))
 
+    @quick
     def setNoise(self, level: float) -> None:  # noqa: N802
-        """Noise floor of the room, root mean square of 16-bit samples."""
-        self.__mixer.ambient = max(0.0, float(level))
+        """Noise floor of the room, root mean square of 16-bit samples; 60 is a quiet room, speech has about 2000."""
+        if not 0 <= float(level) <= LOUDEST:
+            raise NaoqiError(f"cannot set the noise to {level}: its level is from 0 to {LOUDEST:g}")
+        self.__mixer.ambient = float(level)
+
+    @quick
+    def getNoise(self) -> float:  # noqa: N802
+        """Noise floor of the room."""
+        return self.__mixer.ambient
 
     @working
     def getRobotPose(self) -> list[float]:  # noqa: N802
@@ -79,7 +80,7 @@ class SimWorld(Module):
         """Write a picture of the room as a PNG file."""
         self.__there().photograph(Path(name))
 
-    def __there(self) -> Any:
-        if self.__world[0] is None:
+    def __there(self) -> WorldClient:
+        if self.__world is None:
             raise NaoqiError("there is no world: nao_sim was started with --no-world")
-        return self.__world[0]
+        return self.__world

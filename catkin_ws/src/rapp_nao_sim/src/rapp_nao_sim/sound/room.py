@@ -10,13 +10,19 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from rapp_nao_sim.sound.synthesis import RATE, Samples
+from rapp_nao_sim.errors import SimError
+from rapp_nao_sim.sound.samples import RATE, Samples
 
 BLOCK = 320  # samples: 20 ms, the grain of the clock
+MOST = 32  # things that sound at once
 Block = npt.NDArray[np.int16]
 Listener = Callable[[Block], None]
 
 _log = logging.getLogger(__name__)
+
+
+class CrowdedError(SimError):
+    """Too much sounds at once."""
 
 
 @dataclass(eq=False)
@@ -55,20 +61,27 @@ class Mixer:
         self._sounding: list[Sounding] = []
 
     def add(self, sounding: Sounding) -> Sounding:
-        """Let something sound from the next block on."""
+        """Let something sound from the next block on. Raises CrowdedError."""
         with self._lock:
-            if len(self._sounding) >= 32:
-                raise RuntimeError("cannot play: 32 sounds sound already")
+            if len(self._sounding) >= MOST:
+                raise CrowdedError(f"cannot play: {MOST} sounds sound already; stop some, or play it later")
             self._sounding.append(sounding)
         return sounding
 
     def stop(self, sounding: Sounding) -> None:
-        """Stop something that sounds."""
+        """Stop something that sounds; no effect on what has ended."""
         with self._lock:
-            if sounding in self._sounding:
-                self._sounding.remove(sounding)
-        if not sounding.done.done():
-            sounding.done.set_result(False)
+            if sounding not in self._sounding:
+                return
+            self._sounding.remove(sounding)
+        sounding.done.set_result(False)
+
+    def stop_all(self) -> None:
+        """Stop everything."""
+        with self._lock:
+            sounding = list(self._sounding)
+        for each in sounding:
+            self.stop(each)
 
     def block(self) -> Block:
         """The next 20 ms at the microphone."""
@@ -89,6 +102,7 @@ class Room:
 
     def __init__(self, mixer: Mixer) -> None:
         self.mixer = mixer
+        self._lock = threading.Lock()
         self._listeners: list[Listener] = []
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="sound", daemon=True)
@@ -98,16 +112,19 @@ class Room:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop the clock."""
+        """Stop the clock and what sounds."""
         self._stop.set()
         self._thread.join(2)
+        self.mixer.stop_all()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Give every block to `listener`, in the clock's thread; gives the function that ends that."""
-        self._listeners = [*self._listeners, listener]
+        with self._lock:
+            self._listeners = [*self._listeners, listener]  # a new list: the clock goes through the old one without the lock
 
         def end() -> None:
-            self._listeners = [x for x in self._listeners if x is not listener]
+            with self._lock:
+                self._listeners = [x for x in self._listeners if x is not listener]
 
         return end
 

@@ -1,9 +1,8 @@
 """Pronunciation of any word: espeak-ng's phonemes (IPA) mapped to the ARPABET of pocketsphinx's English model."""
 
 import re
-import subprocess
 
-TIMEOUT = 5.0  # s, for one word
+from rapp_nao_sim.sound.synthesis import espeak
 
 # Longest first; the right side is one or more phones of CMUdict.
 _PHONES = {
@@ -35,7 +34,5 @@ def to_arpabet(ipa: str) -> str:
 
 
 def pronounce(word: str, voice: str = "en-us") -> str:
-    """ARPABET pronunciation of a word as an espeak-ng voice says it; empty when it says nothing."""
-    words = ["espeak-ng", "-q", "--ipa", "-v", voice, "--", word]
-    ipa = subprocess.run(words, capture_output=True, text=True, timeout=TIMEOUT, check=True).stdout
-    return to_arpabet(ipa)
+    """ARPABET pronunciation of a word as an espeak-ng voice says it; empty when it says nothing. Raises VoiceError."""
+    return to_arpabet(espeak("-q", "--ipa", "-v", voice, "--", word).decode())

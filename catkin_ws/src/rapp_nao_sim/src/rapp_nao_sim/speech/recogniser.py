@@ -12,8 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from pocketsphinx import Decoder, get_model_path
 
+from rapp_nao_sim.errors import SimError
 from rapp_nao_sim.sound.room import Block
-from rapp_nao_sim.sound.synthesis import RATE
+from rapp_nao_sim.sound.samples import RATE
 from rapp_nao_sim.speech.pronunciation import pronounce
 from rapp_nao_sim.speech.words import spoken_words
 
@@ -25,6 +26,10 @@ FILLERS = frozenset(("SIL", "<sil>", "[NOISE]", "[SPEECH]", "+NSN+", "+SPN+", "(
 PAD = 0.2  # s of noise around the sound: the decoder's front end has to settle
 
 
+class VocabularyError(SimError):
+    """A phrase of the vocabulary cannot be heard."""
+
+
 class Recogniser:
     """One vocabulary at a time; words outside the dictionary get their pronunciation from espeak-ng."""
 
@@ -34,9 +39,10 @@ class Recogniser:
         self._phrases: dict[tuple[str, ...], str] = {}
 
     def set_vocabulary(self, phrases: Sequence[str]) -> None:
-        """Listen for these phrases from now on; answers use the caller's spelling."""
+        """Listen for these phrases from now on; answers use the caller's spelling. Raises VocabularyError, VoiceError."""
         spoken = {tuple(spoken_words(phrase)): phrase for phrase in phrases}
-        spoken.pop((), None)
+        if () in spoken:
+            raise VocabularyError(f"cannot learn to hear {spoken[()]!r}: there is no word in it")
         for word in {word for words in spoken for word in words}:
             self._learn(word)
         self._phrases = spoken
@@ -75,7 +81,7 @@ class Recogniser:
         if self._decoder.lookup_word(word) is None:
             phones = pronounce(word)
             if not phones:
-                raise ValueError(f"cannot learn to hear {word!r}: espeak-ng gives no pronunciation")
+                raise VocabularyError(f"cannot learn to hear {word!r}: espeak-ng gives no pronunciation")
             self._decoder.add_word(word, phones, True)
 
 
