@@ -35,7 +35,7 @@ class Workshop:
     def __init__(self, folder: Path, ros_env: dict[str, str]) -> None:
         self.folder = folder
         ros = {name: ros_env[name] for name in ("ROS_MASTER_URI", "ROS_IP")}
-        limits = Limits(memory=1 << 30, cpu=20, processes=40, files=64, file_size=1 << 20)
+        limits = Limits(memory=1 << 30, cpu=20, processes=40, files=64, file_size=1 << 20, private=4 << 20)
         self.config = Config(home=folder / "home", limits=limits, terminate=2.0)
         self.launcher = Launcher(self.config, ros)
         self.launcher.open()

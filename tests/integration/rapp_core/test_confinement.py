@@ -154,11 +154,26 @@ files.clear()
     assert 0 < facts["open"] < 64
 
 
-def test_the_account_is_the_run_s_own_when_root_starts_it(workshop):
-    runs = [workshop.start("import time\nwhile True: time.sleep(0.1)") for _ in range(2)]
+def test_its_private_folder_cannot_be_filled_beyond_its_size(workshop):
+    body = """
+facts = 0
+try:
+    for number in range(50):
+        with open(f"file{number}", "wb", buffering=0) as file:
+            facts += file.write(bytes(1 << 19))
+except OSError:
+    pass
+"""
+    assert 1 << 19 < workshop.facts(body.strip()) <= workshop.config.limits.private
+
+
+def test_the_account_is_the_run_s_own_when_root_starts_it(workshop, wait_for):
+    runs = [workshop.start("import time\nopen('mine', 'w').close()\nwhile True: time.sleep(0.1)") for _ in range(2)]
     accounts = [run.folders.account for run in runs]
     if os.geteuid() == 0:
         assert all(account is not None and 65000 <= account < 65500 for account in accounts)
-        assert {run.folders.private.stat().st_uid for run in runs} == set(accounts)
+        mine = [Path(f"/proc/{run._process.first}/root/rapp/private/mine") for run in runs]
+        wait_for(lambda: all(path.exists() for path in mine))
+        assert [path.stat().st_uid for path in mine] == accounts
     else:
         assert accounts == [None, None]

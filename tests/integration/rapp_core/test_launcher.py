@@ -112,7 +112,7 @@ open("/rapp/private/started", "w").close()
 while True: time.sleep(0.05)
 """
     run = workshop.start(body.strip())
-    wait_for(lambda: (run.folders.private / "started").exists())
+    wait_for(lambda: Path(f"/proc/{run._process.first}/root/rapp/private/started").exists())
     inside = inside_of(run)
     assert len(inside) >= 3  # bubblewrap's first process, the runner, the grandchild
     run.end(0.2)

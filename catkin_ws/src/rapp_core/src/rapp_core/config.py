@@ -23,6 +23,7 @@ class Limits:
     processes: int = 64  # processes and threads
     files: int = 256  # open files
     file_size: int = 64 << 20  # bytes of one file
+    private: int = 64 << 20  # bytes of all files in its private folder, in memory
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
 """The bubblewrap sandbox of a dynamic agent (DESIGN section 3.6): what it sees, and what it may use.
 
-It sees a read-only system, the Python environment, its own package, the recordings of its own run, and one private folder. It
-inherits one descriptor, its channel, and no environment. The network is the host's until the gate of DESIGN section 3.6.
+It sees a read-only system, the Python environment, its own package, the recordings of its own run, and one private folder, which
+is of bounded size, in memory, and ends with it. It inherits one descriptor, its channel, and no environment. The network is the
+host's until the gate of DESIGN section 3.6.
 """
 
 import importlib.util
-import os
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -35,11 +35,6 @@ class RunFolders:
         return self.root / "package"
 
     @property
-    def private(self) -> Path:
-        """The only writable folder; /rapp/private inside."""
-        return self.root / "private"
-
-    @property
     def recordings(self) -> Path:
         """What the core agent records for this run; read-only inside, at the same path as outside."""
         return self.root / "recordings"
@@ -50,11 +45,9 @@ class RunFolders:
         return self.root / "agent.log"
 
     def make(self) -> None:
-        """Create the folders; the private one belongs to whoever runs inside."""
-        for folder in (self.package, self.private, self.recordings):
+        """Create the folders."""
+        for folder in (self.package, self.recordings):
             folder.mkdir(parents=True)
-        if self.account is not None:
-            os.chown(self.private, self.account, self.account)
 
 
 def command(folders: RunFolders, limits: Limits, environment: dict[str, str]) -> list[str]:
@@ -71,7 +64,7 @@ def command(folders: RunFolders, limits: Limits, environment: dict[str, str]) ->
         words += ["--ro-bind-try" if inside in SYSTEM else "--ro-bind", outside, inside]
     for name in ("bin", "lib", "lib64", "sbin"):
         words += ["--symlink", f"usr/{name}", f"/{name}"]
-    words += ["--bind", str(folders.private), INSIDE_PRIVATE, "--chdir", INSIDE_PRIVATE]
+    words += ["--perms", "1777", "--size", str(limits.private), "--tmpfs", INSIDE_PRIVATE, "--chdir", INSIDE_PRIVATE]
     for name, value in environment.items():
         words += ["--setenv", name, value]
     for folder in ("/tmp", "/dev", "/"):
