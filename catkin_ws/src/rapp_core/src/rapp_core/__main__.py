@@ -18,8 +18,9 @@ from rapp_core.errors import CoreError, Invalid
 from rapp_core.launcher.launcher import Launcher
 from rapp_core.launcher.lease import Lease
 from rapp_core.ports import Voice
-from rapp_core.robot.naoqi import robot
+from rapp_core.robot.naoqi import robot, subscriber
 from rapp_core.robot.naoqi.connection import Connection
+from rapp_core.robot.naoqi.guard import Guard
 from rapp_core.ros.hop import RosHop
 from rapp_core.ros.node import join, leave, log_to_stderr
 from rapp_core.ros.services import RosServices
@@ -48,7 +49,8 @@ def main() -> int:
         return 2 if isinstance(error, Invalid) else 1
     try:
         if join("core_agent", stop):
-            _run(config, launcher, stop)
+            with Guard(config.robot, subscriber(config), config.home):
+                _run(config, launcher, stop)
         farewell = leave()
     except CoreError as error:
         _log.error("%s", error)

@@ -10,11 +10,16 @@ from rapp_core.robot.naoqi.recorder import NaoqiRecorder
 from rapp_core.robot.naoqi.voice import NaoqiVoice
 
 
+def subscriber(config: Config) -> str:
+    """Name under which the core agent listens to the robot's extractors."""
+    return f"rapp_{config.name}"
+
+
 def robot(connection: Connection, config: Config) -> Robot:
     """All virtual effectors and receptors of one NAO."""
     return Robot(
         NaoqiVoice(connection),
-        NaoqiEars(connection, f"rapp_{config.name}"),
+        NaoqiEars(connection, subscriber(config)),
         NaoqiRecorder(connection),
         NaoqiPlayer(connection),
         NaoqiBody(connection),

@@ -1,0 +1,179 @@
+"""Stops the robot when its core agent is gone (DESIGN section 3.1): a small process beside the core agent that outlives it.
+
+The core agent holds one end of a pipe that nobody else has; the kernel closes it when the core agent ends, however that comes.
+Then the guard stops motion, speech, playing, recording and listening, twice, since what the core agent had just asked for may reach
+the robot after the first time; and ends. It speaks NAOqi only, and works the same on a robot and on the simulator. A NAO does not
+stop by itself what a client has started that is gone.
+"""
+
+import argparse
+import contextlib
+import fcntl
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+from rapp_core.errors import CoreError, Refused
+from rapp_core.robot.naoqi.connection import Connection
+
+AGAIN = 0.3  # s between the two times
+LATEST = 2.0  # s after the core agent's end: a robot that is not reached until then is left to the next core agent
+ANSWER = 0.5  # s for the robot to take a stop
+LOOK = 0.02  # s between two looks whether it has gone
+LEAVING = 1.0  # s for the guard to end when it is told to
+RESTART = 0.5  # s before a guard that has ended is started anew
+DONE = b"done"  # told by a core agent that has stopped the robot itself
+
+_log = logging.getLogger(__name__)
+
+
+class Guard:
+    """The core agent's end. Entered, it starts the process, and again should it end; left without an error, it ends it."""
+
+    def __init__(self, robot: str, subscriber: str, home: Path) -> None:
+        """`subscriber` is the name under which the core agent listens; one data folder has one guard at a time."""
+        self._words = [sys.executable, "-m", "rapp_core.robot.naoqi.guard", "--robot", robot, "--subscriber", subscriber]
+        self._lock_file = home / "guard.lock"
+        self._closing = threading.Event()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._keeper = threading.Thread(target=self._keep, name="guard", daemon=True)
+
+    def __enter__(self) -> "Guard":
+        self._process = self._start()
+        self._keeper.start()
+        return self
+
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        self._closing.set()
+        self._keeper.join()
+        if self._process is not None:
+            _end(self._process, told=error is None)
+
+    @property
+    def pid(self) -> int | None:
+        """Process id of the guard."""
+        return None if self._process is None else self._process.pid
+
+    def _start(self) -> "subprocess.Popen[bytes]":
+        """Start the process, in a session of its own: what ends the core agent's group does not end it."""
+        lock = self._take_lock()
+        try:
+            return subprocess.Popen(
+                self._words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, pass_fds=(lock,), start_new_session=True
+            )
+        finally:
+            os.close(lock)
+
+    def _take_lock(self) -> int:
+        """Wait until the guard of an earlier core agent has ended, so that it does not stop what this one starts.
+
+        The lock belongs to the open file, which the process inherits, and so is held until that ends.
+        """
+        lock = os.open(self._lock_file, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+        deadline = time.monotonic() + LATEST + LEAVING
+        while time.monotonic() < deadline:
+            with contextlib.suppress(BlockingIOError):
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return lock
+            time.sleep(LOOK)
+        _log.warning("the guard of an earlier core agent is still there")
+        return lock
+
+    def _keep(self) -> None:
+        while not self._closing.wait(RESTART):
+            process = self._process
+            if process is not None and process.poll() is not None:
+                _log.warning("the guard has ended with status %s: it is started again", process.returncode)
+                _end(process, told=True)
+                self._process = None
+            if self._process is None:
+                try:
+                    self._process = self._start()
+                except OSError as error:
+                    _log.error("cannot start the guard: %s", error)
+
+
+def _end(process: "subprocess.Popen[bytes]", told: bool) -> None:
+    """Let a guard end, that is told or else shall stop the robot, and reap it."""
+    assert process.stdin is not None
+    with contextlib.suppress(BrokenPipeError):
+        if told:
+            process.stdin.write(DONE)
+        process.stdin.close()
+    try:
+        process.wait(LEAVING if told else LATEST + LEAVING)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def stops(subscriber: str) -> list[tuple[str, ...]]:
+    """Module, method and arguments of all that stops the robot; motion first."""
+    return [
+        ("ALMotion", "stopMove"),
+        ("ALMotion", "killAll"),
+        ("ALRobotPosture", "stopMove"),
+        ("ALTextToSpeech", "stopAll"),
+        ("ALAudioPlayer", "stopAll"),
+        ("ALAudioRecorder", "stopMicrophonesRecording"),
+        ("ALSpeechRecognition", "unsubscribe", subscriber),
+        ("ALSoundDetection", "unsubscribe", subscriber),
+    ]
+
+
+def still(connection: Connection, subscriber: str) -> bool:
+    """Ask for all stops at once, then wait for them; gives whether the robot has answered each."""
+    answers, reached = [], True
+    for module, method, *arguments in stops(subscriber):
+        try:
+            answers.append(connection.start(module, method, *arguments))
+        except Refused as error:
+            _log.info("%s", error)
+        except CoreError as error:
+            _log.warning("%s", error)
+            reached = False
+    deadline = time.monotonic() + ANSWER
+    for answer in answers:
+        answer.wait(round(max(0.0, deadline - time.monotonic()) * 1000))
+        reached = reached and answer.isFinished()
+    return reached
+
+
+def stop_robot(connection: Connection, subscriber: str) -> bool:
+    """Stop everything, twice; gives whether the robot was reached in time."""
+    deadline, times = time.monotonic() + LATEST, 0
+    while times < 2 and time.monotonic() < deadline:
+        times += still(connection, subscriber)
+        if times < 2:
+            time.sleep(AGAIN)
+    return times == 2
+
+
+def main() -> int:
+    """Wait for the core agent's end or word; gives the exit status."""
+    parser = argparse.ArgumentParser(prog="guard", description="stops the robot when its core agent, on standard input, is gone")
+    parser.add_argument("--robot", required=True, help="URL of NAOqi")
+    parser.add_argument("--subscriber", required=True, help="name under which the core agent listens")
+    options = parser.parse_args()
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s guard %(levelname)s %(message)s", stream=sys.stderr)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.stdin.buffer.read() == DONE:
+        return 0
+    _log.warning("the core agent is gone: the robot is stopped")
+    connection = Connection(options.robot, ANSWER)
+    try:
+        reached = stop_robot(connection, options.subscriber)
+    finally:
+        connection.close()
+    if not reached:
+        _log.error("cannot stop the robot: it did not answer in %g s; the next core agent stops it", LATEST)
+    return 0 if reached else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
