@@ -23,9 +23,12 @@ def write_rapp(folder: Path, name: str, body: str = "pass", keywords: tuple[str,
         "rapp": {
             "agent": "dynamic",
             "entry": "agent.py",
+            "runtime": "python3",
             "keywords": {"en": list(keywords or (name,))},
             "sentences": {"en": [f"please run {name}"]},
             "permissions": {"core": ["rapp_say"], "cloud": []},
+            "partner": None,
+            "needs": {"robot": ["nao"], "api": ">=1.0"},
             **rapp,
         },
     }
