@@ -1,5 +1,6 @@
 """State s3: isolated keywords and long commands."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,12 +17,15 @@ CONFIG = Config(
 )  # fmt: skip
 
 
+QUICK = replace(CONFIG, end_of_command=0.2)
+
+
 class Room:
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, config: Config = CONFIG) -> None:
         self.clock = Clock()
         self.fake = FakeRobot(self.clock)
         self.recording = folder / "listening" / "command.ogg"
-        self._listener = Listener(self.fake.robot, CONFIG, self.clock.now)
+        self._listener = Listener(self.fake.robot, config, self.clock.now)
 
     def round(self, *keywords: str) -> str | Path | None:
         return self._listener.round(keywords, self.recording, self.clock.event())
@@ -72,6 +76,35 @@ def test_a_pause_within_a_sentence_does_not_end_it(room: Room) -> None:
     room.fake.person_says_at(3.7, "to send a message", seconds=1.0)
     assert room.round("e-mail") == room.recording
     assert room.clock.time == pytest.approx(4.7 + 0.8, abs=0.05)
+
+
+def test_what_the_recogniser_rejects_is_taken_without_more_ado(tmp_path: Path) -> None:
+    room = Room(tmp_path, QUICK)
+    room.fake.person_says_at(2.0, "what time is it", probability=0.1, seconds=2.0)
+    assert room.round("e-mail") == room.recording
+    assert room.clock.time == pytest.approx(4.0 + 0.2, abs=0.05)
+
+
+def test_the_recogniser_has_its_time_for_what_could_be_a_keyword(tmp_path: Path) -> None:
+    room = Room(tmp_path, QUICK)
+    room.fake.person_says_at(2.0, "what the recogniser does not speak of", probability=0.9, seconds=2.0)
+    assert room.round("e-mail") == room.recording
+    assert room.clock.time == pytest.approx(4.0 + 0.8, abs=0.05)
+
+
+def test_a_verdict_on_the_sound_before_does_not_count(tmp_path: Path) -> None:
+    room = Room(tmp_path, QUICK)
+    room.fake.person_says_at(2.0, "hm", probability=0.1, seconds=0.5)
+    room.fake.person_says_at(2.7, "what the recogniser does not speak of", probability=0.9, seconds=1.2)
+    assert room.round("e-mail") == room.recording
+    assert room.clock.time == pytest.approx(3.9 + 0.8, abs=0.05)
+
+
+def test_a_sound_too_long_for_a_keyword_needs_no_verdict(tmp_path: Path) -> None:
+    room = Room(tmp_path, QUICK)
+    room.fake.person_says_at(2.0, "what the recogniser does not speak of", probability=0.9, seconds=2.6)
+    assert room.round("e-mail") == room.recording
+    assert room.clock.time == pytest.approx(4.6 + 0.2, abs=0.05)
 
 
 def test_a_sentence_is_no_keyword_whatever_the_recogniser_thinks(room: Room) -> None:

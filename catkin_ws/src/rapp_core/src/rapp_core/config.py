@@ -40,8 +40,8 @@ class Config:
     long_command: float = 1.4  # s; a longer sound that is no keyword is a long command; includes the detector's hang-over
     longest_keyword: float = 2.5  # s; a longer sound is no isolated keyword, whatever the recogniser makes of it
     longest_command: float = 30.0  # s; what goes on longer is taken as it is
-    end_of_command: float = 0.8  # s of quiet that end a long command
-    verdict: float = 0.8  # s the recogniser may take after the end of a sound
+    end_of_command: float = 0.2  # s of quiet that end a long command, after the detector's own hang-over
+    verdict: float = 0.8  # s the recogniser may take after the end of a sound that could be a keyword
     listening_round: float = 10.0  # s after which a quiet listening round, and its recording, start anew
     naoqi_timeout: float = 5.0  # s for calls of NAOqi that return at once
     register_timeout: float = 4.0  # s

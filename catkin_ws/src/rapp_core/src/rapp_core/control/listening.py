@@ -50,6 +50,8 @@ class Listener:
                     speech.take(at, item)
                 elif item.probability >= self._config.threshold and item.text in keywords and speech.may_be_keyword():
                     return item.text
+                else:
+                    speech.rejected()
             if speech.is_command(self._now()):
                 return recording
             if not self._robot.present():
@@ -60,20 +62,26 @@ class Listener:
 
 
 class _Speech:
-    """Sounds of one round put together: pauses shorter than `end_of_command` belong to one utterance."""
+    """Sounds of one round put together: what follows within `_pause` belongs to the same utterance."""
 
     def __init__(self, config: Config) -> None:
         self._config = config
         self._begun: float | None = None
         self._ended: float | None = None
+        self._rejected = False  # whether the recogniser has found no keyword in the last sound
 
     def take(self, at: float, sound: Sound) -> None:
+        self._rejected = False
         if sound.begun:
             if self._begun is None or (self._ended is not None and at - self._ended > self._pause):
                 self._begun = at
             self._ended = None
         elif self._begun is not None:
             self._ended = at
+
+    def rejected(self) -> None:
+        """Note that the recogniser has told something else than a keyword."""
+        self._rejected = self._ended is not None
 
     @property
     def _pause(self) -> float:
@@ -86,12 +94,15 @@ class _Speech:
         return self._ended - self._begun <= self._config.longest_keyword
 
     def is_command(self, now: float) -> bool:
-        """Whether an utterance longer than a keyword has ended, and the recogniser has had its time."""
+        """Whether an utterance longer than a keyword has ended, and the recogniser has found none in it, or had its time."""
+        config = self._config
         if self._begun is None:
             return False
         if self._ended is None:
-            return now - self._begun >= self._config.longest_command
-        return self._ended - self._begun >= self._config.long_command and now - self._ended >= self._pause
+            return now - self._begun >= config.longest_command
+        length, quiet = self._ended - self._begun, now - self._ended
+        judged = self._rejected or length > config.longest_keyword or quiet >= config.verdict
+        return length >= config.long_command and quiet >= config.end_of_command and judged
 
     def quiet(self, now: float) -> bool:
         """Whether nobody is speaking, nor has just spoken."""
