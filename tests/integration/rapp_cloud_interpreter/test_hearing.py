@@ -49,6 +49,14 @@ def test_paraphrase_names_its_rapp(interpreter, recording, voice):
     assert "message" in found.text
 
 
+def test_quiet_before_the_sentence_does_no_harm(interpreter, recording):
+    file = recording("I would like to send a message to my son")
+    samples, rate = soundfile.read(file)
+    quiet = 0.002 * np.random.default_rng(5).standard_normal(12 * rate)  # a whole listening round, and more than 384 frames
+    soundfile.write(file, np.concatenate([quiet, samples]), rate, format="OGG", subtype="VORBIS")
+    assert interpreter.interpret(file, COMMANDS).rapp == "voice_mail"
+
+
 def test_foreign_sentence_names_none(interpreter, recording):
     found = interpreter.interpret(recording("the old castle stands on a hill above the town"), COMMANDS)
     assert found.rapp is None

@@ -23,6 +23,8 @@ from rapp_cloud.interpreter.tokens import END, START, Vocabulary, read_vocabular
 _LAYERS, _HEADS, _WIDTH = 6, 8, 36
 _PIECES_PER_SECOND = 6.5
 """More than anyone speaks; Moonshine's own bound against texts that repeat themselves."""
+_SAMPLES_PER_FRAME = 384
+"""Of what the encoder gives."""
 _SHORTEST = RATE // 5
 """Samples; a word takes longer, and the encoder needs about a third of it."""
 
@@ -103,10 +105,11 @@ class Recogniser:
     ) -> tuple[Floats, dict[str, Floats]]:
         batch = len(rows)
         hidden = np.repeat(encoded, batch, axis=0)
+        mask = (batch, hidden.shape[1] * _SAMPLES_PER_FRAME)  # of samples: the model takes every 384th itself
         feed: dict[str, Any] = {
             "input_ids": rows,
             "encoder_hidden_states": hidden,
-            "encoder_attention_mask": np.ones(hidden.shape[:2], dtype=np.int64),
+            "encoder_attention_mask": np.ones(mask, dtype=np.int64),
             "use_cache_branch": np.array([cached]),
             **past,
         }
