@@ -7,6 +7,7 @@ import sys
 from rapp_cli.paths import BENCHMARKS, ROOT
 
 SUBJECTS = {
+    "activation": "activation.py",
     "interpret": "interpret.py",
     "bridge": "bridge.py",
 }

@@ -25,6 +25,7 @@ class System:
     children: Children
     bridge: str  # ws URL of the rosbridge
     robot: str  # URL of the robot's NAOqi
+    master: str  # URI of the ROS master
     maildir: Path
     logs: Path
 
@@ -51,7 +52,7 @@ async def running_system(config: DemoConfig) -> AsyncIterator[System]:
             words += ["--robot", config.robot]
         env = {**os.environ, **_link_environment(cloud, account)}
         ready = await children.start(Child("robot", words, env, logs / "robot.log"))
-        yield System(children, ready["bridge"], ready["robot"], maildir, logs)
+        yield System(children, ready["bridge"], ready["robot"], ready["master"], maildir, logs)
 
 
 async def _mail_server(children: Children, maildir: Path, logs: Path) -> MailAccount:
