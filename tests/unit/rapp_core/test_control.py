@@ -42,7 +42,8 @@ class Home:
         self.trace.listen(self.happenings.append)
         self.lease = Lease(self.config, self.clock.now)
         self.stop = self.clock.event()
-        context = Context(self.fake.robot, self.config, self.trace, folder / "listening", now=self.clock.now)
+        listening = folder / "listening"
+        context = Context(self.fake.robot, self.config, self.trace, listening, cut=self.stop, now=self.clock.now)
         self.executor = Executor(context)
         self.platform = Platform(self.link, self.config, self.trace)
         parts = Parts(
@@ -189,6 +190,55 @@ def test_one_run_after_another(home: Home) -> None:
         assert home.round() == KEYWORD
     assert not any(run.alive for run in home.agents.runs)
     assert len(home.agents.runs) == 3
+
+
+# a long command that fits several RApps
+
+ASKED = ["s3", "s5", "s12", "s6", "s7", "s8", "s9", "s10", "s3"]
+QUESTION = "Do you mean clock or alarm clock?"
+
+
+def ask_what_fits_two(home: Home, answer: str | None) -> None:
+    home.link.catalogue.append({"name": "alarm_clock", "version": "1.0.0", "keywords": {"en": ["wake me"]}})
+    home.link.shelf["alarm_clock"] = write_rapp(home.config.home.parent / "store" / "alarm_clock", "alarm_clock")
+    home.link.answers["interpret"] = {"rapp": None, "confidence": 0.8, "text": "the clock", "choice": ["clock", "alarm_clock"]}
+    home.start()
+    ask(home, "something with the clock please", seconds=2.5, probability=0.1)
+    home.step_until(lambda: home.machine.state == "s12")
+    if answer is not None:
+        home.fake.person_says_at(home.clock.time + 3.0, answer)
+
+
+@pytest.mark.parametrize(
+    ("answer", "rapp"),
+    [("clock", "clock"), ("alarm clock", "alarm_clock"), ("what time is it", "clock"), ("wake me", "alarm_clock")],
+)
+def test_when_a_long_command_fits_two_it_asks_which_and_goes_on(home: Home, answer: str, rapp: str) -> None:
+    ask_what_fits_two(home, answer)
+    assert home.round() == ASKED
+    assert home.fake.said() == [QUESTION]
+    assert ("install", {"name": rapp}) in home.link.asked
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [(None, "I did not understand you"), ("no", "All right, I do nothing"), ("hello", "I did not understand you")],
+)
+def test_without_an_answer_to_its_question_it_gives_up_after_a_bound(home: Home, answer: str | None, words: str) -> None:
+    ask_what_fits_two(home, answer)
+    begun = home.clock.time
+    assert home.round() == ["s3", "s5", "s12", "s11", "s3"]
+    assert home.fake.said() == [QUESTION, words]
+    assert home.clock.time - begun <= home.config.recognise_timeout + 0.5
+    assert "install" not in home.link.names()
+
+
+def test_told_to_end_it_waits_for_no_answer(home: Home) -> None:
+    ask_what_fits_two(home, None)
+    home.clock.after(1.0, home.stop.set)
+    begun = home.clock.time
+    home.machine.step(home.share)
+    assert home.clock.time - begun < 1.2
 
 
 # failures: each goes back to s3 and says so aloud

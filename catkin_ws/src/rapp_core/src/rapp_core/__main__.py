@@ -68,7 +68,7 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     nao = robot(connection, config)
     trace, states, lease = Trace(), StatePublisher(), Lease(config)
     trace.listen(states.tell)
-    executor, hop = Executor(Context(nao, config, trace, config.home / "listening")), RosHop(stop)
+    executor, hop = Executor(Context(nao, config, trace, config.home / "listening", cut=stop)), RosHop(stop)
     platform = Platform(hop, config, trace)
     control = Control(Parts(nao, hop, launcher, executor, platform, lease, trace, config, stop))
     RosServices(executor, Outside(hop, config, trace), lease, trace)

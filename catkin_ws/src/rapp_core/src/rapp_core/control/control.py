@@ -12,6 +12,7 @@ from rapp_agent import Subsystem
 from rapp_core.config import Config
 from rapp_core.control.listening import Listener
 from rapp_core.control.platform import Platform
+from rapp_core.control.question import which
 from rapp_core.errors import CoreError, Refused, Unreachable
 from rapp_core.launcher.lease import Lease
 from rapp_core.ports import Agent, Agents, Hop, Robot
@@ -27,6 +28,7 @@ DYNAMIC_KINDS = ("entered", "left", "failed")
 READY = "I am ready"
 READY_ALONE = "I am ready, but I cannot reach the platform"
 NOT_UNDERSTOOD = "I did not understand you"
+NONE_OF_THEM = "All right, I do nothing"
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class Control:
     def listen(self, share: Subsystem) -> None:
         """One listening round."""
         parts = self._parts
-        share.memory.update(keyword=None, command=None, problem=None, rapp=None, error=None)
+        share.memory.update(keyword=None, command=None, choice=None, problem=None, rapp=None, error=None)
         keywords = {keyword: known.name for known in parts.platform.rapps().values() for keyword in known.keywords}
         heard = self._listener.round(sorted(keywords), self._recording, parts.stop)
         if isinstance(heard, Path):
@@ -108,9 +110,20 @@ class Control:
             return
         if answer.get("text"):
             parts.trace.heard(str(answer["text"]))
-        share.memory["rapp"] = answer.get("rapp")
-        if answer.get("rapp") is None:
+        share.memory.update(rapp=answer.get("rapp"), choice=answer.get("choice"))
+        if answer.get("rapp") is None and not answer.get("choice"):
             share.memory["problem"] = NOT_UNDERSTOOD
+
+    def ask_which(self, share: Subsystem) -> None:
+        """Ask which of several RApps is meant, listen for the answer as long as rapp_recognize does, and take it."""
+        executor, choice = self._parts.executor, share.memory["choice"]
+        assert isinstance(choice, list)
+        asked = which(map(str, choice), self._parts.platform.rapps())
+        executor.run("rapp_say", text=asked.text, language="en")
+        word = executor.run("rapp_recognize", dictionary=list(asked.answers), timeout=0.0)["word"]
+        share.memory["rapp"] = asked.answers.get(word)
+        if share.memory["rapp"] is None:
+            share.memory["problem"] = NONE_OF_THEM if word in asked.answers else NOT_UNDERSTOOD
 
     def download(self, share: Subsystem) -> None:
         """Have the link download, verify and install the RApp, unless it is here already."""

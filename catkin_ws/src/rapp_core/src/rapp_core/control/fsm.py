@@ -19,6 +19,7 @@ class Acts(Protocol):
     def heard(self, share: Subsystem) -> bool: ...  # noqa: D102
     def keyword(self, share: Subsystem) -> None: ...  # noqa: D102
     def long_command(self, share: Subsystem) -> None: ...  # noqa: D102
+    def ask_which(self, share: Subsystem) -> None: ...  # noqa: D102
     def download(self, share: Subsystem) -> None: ...  # noqa: D102
     def activate(self, share: Subsystem) -> None: ...  # noqa: D102
     def await_first_word(self, share: Subsystem) -> None: ...  # noqa: D102
@@ -39,6 +40,11 @@ def is_keyword(share: Subsystem) -> bool:
     return share.memory.get("keyword") is not None
 
 
+def is_unclear(share: Subsystem) -> bool:
+    """Whether what was heard fits several RApps."""
+    return bool(share.memory.get("choice"))
+
+
 def core_machine(acts: Acts) -> Machine:
     """Build the FSM; any failure leads to s11, which says it aloud, and back to s3."""
     states = {
@@ -53,6 +59,7 @@ def core_machine(acts: Acts) -> Machine:
         "s9": Behaviour("s9", acts.serve, acts.over, label="await and execute commands"),
         "s10": Behaviour("s10", acts.destroy, label="destroy"),
         "s11": Behaviour("s11", acts.apologise, label="say what failed"),
+        "s12": Behaviour("s12", acts.ask_which, label="ask which is meant"),
     }
     edges = [
         Edge("s1", "s2"),
@@ -63,7 +70,10 @@ def core_machine(acts: Acts) -> Machine:
         Edge("s4", "s11", failed, "failed"),
         Edge("s4", "s6"),
         Edge("s5", "s11", failed, "not understood"),
+        Edge("s5", "s12", is_unclear, "fits several"),
         Edge("s5", "s6", label="interpreted"),
+        Edge("s12", "s11", failed, "no answer"),
+        Edge("s12", "s6", label="answered"),
         Edge("s6", "s11", failed, "failed"),
         Edge("s6", "s7"),
         Edge("s7", "s11", failed, "failed"),
