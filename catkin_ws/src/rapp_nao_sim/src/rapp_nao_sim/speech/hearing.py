@@ -72,7 +72,8 @@ class Hearing:
     def feed(self, block: Block) -> None:
         """Take 20 ms of the microphone; called by the sound clock."""
         if self._speaking.is_set():
-            self._endpointer.interrupt()
+            if self._endpointer.interrupt():
+                self._detected(0)
             return
         change = self._endpointer.feed(block)
         if isinstance(change, Started):

@@ -51,18 +51,18 @@ class Recogniser:
             self._decoder.add_jsgf_string("words", f"#JSGF V1.0; grammar g; public <w> = {alternatives} ;")
 
     def recognise(self, samples: Block) -> list[tuple[str, float]]:
-        """Best phrase and its probability, [] when nothing like speech was in the sound."""
+        """Best phrase and its probability; some phrase with none when the sound is like no phrase at all."""
         if not self._phrases:
             return []
-        noise = np.random.default_rng(1).normal(0, max(1.0, _floor(samples)), round(PAD * RATE))
+        noise = np.random.default_rng(1).normal(0, max(1.0, noise_floor(samples)), round(PAD * RATE))
         padding = np.clip(noise, -32768, 32767).astype(np.int16)
         sound = np.concatenate([padding, samples, padding]).tobytes()
         words, ratio_words, frames = self._decode("words", sound)
-        if words is None:
-            return []
+        phrase = self._phrases.get(tuple(words.lower().split())) if words is not None else None
+        if phrase is None:
+            return [(next(iter(self._phrases.values())), 0.0)]  # so that whoever waits knows that it was no phrase
         _, ratio_phones, _ = self._decode("phones", sound)
-        phrase = self._phrases.get(tuple(words.lower().split()))
-        return [(phrase, _probability(ratio_words - ratio_phones, frames))] if phrase is not None else []
+        return [(phrase, probability(ratio_words - ratio_phones, frames))]
 
     def _decode(self, search: str, sound: bytes) -> tuple[str | None, float, int]:
         decoder = self._decoder
@@ -85,14 +85,15 @@ class Recogniser:
             self._decoder.add_word(word, phones, True)
 
 
-def _floor(samples: Block) -> float:
+def noise_floor(samples: Block) -> float:
     """Noise floor of a sound: the level of its quietest tenth."""
     blocks = samples[: len(samples) // 160 * 160].reshape(-1, 160).astype(np.float64)
     levels = np.sqrt((blocks**2).mean(axis=1)) if len(blocks) else np.ones(1)
     return float(np.quantile(levels, 0.1))
 
 
-def _probability(ratio: float, frames: int) -> float:
+def probability(ratio: float, frames: int) -> float:
+    """That a word was said, from the log likelihood ratio (nats) between it and the phone loop, and its frames of 10 ms."""
     length = max(frames, SHORTEST)
     a, b, c, bias = WEIGHTS
     x = a * 10 * ratio / length + b * ratio / 50 + c * length / 50 + bias
