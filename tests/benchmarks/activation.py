@@ -35,7 +35,7 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from rapp_cli.demo.config import DemoConfig
 from rapp_cli.demo.system import System, running_system
-from rapp_cli.demo.timeline import KINDS
+from rapp_cli.timeline import KINDS
 from rapp_nao_sim.sound.synthesis import RATE, speak
 
 RAPP = "clock"  # needs nothing of the cloud, so that its first call is to the robot

@@ -3,7 +3,7 @@
 import asyncio
 import io
 
-from rapp_cli.demo.timeline import Entry, Timeline
+from rapp_cli.timeline import Entry, Timeline
 
 
 def test_entries_are_printed_with_agent_state_and_words() -> None:

@@ -10,11 +10,11 @@ from typing import Any
 
 from rapp_cli.demo import mailbox
 from rapp_cli.demo.config import DemoConfig, add_options, read
-from rapp_cli.demo.person import Person
 from rapp_cli.demo.story import Lines, live
 from rapp_cli.demo.system import System, running_system
-from rapp_cli.demo.timeline import Entry, Timeline, follow
 from rapp_cli.errors import CommandError
+from rapp_cli.person import Person
+from rapp_cli.timeline import Entry, Timeline, follow
 
 __all__ = ["add_options", "run"]
 

@@ -9,22 +9,12 @@ from pathlib import Path
 
 import platformdirs
 
+from rapp_cli import mail_account
 from rapp_cli.errors import UsageError
+from rapp_cli.mail_account import MailAccount
 
 KEYWORD = "e-mail"
 SENTENCE = "I would like to send a message to my daughter"
-
-
-@dataclass(frozen=True)
-class MailAccount:
-    """The real mail account to send with; its password never passes through here."""
-
-    host: str
-    port: int
-    user: str
-    security: str  # none, starttls or tls
-    password_file: Path | None
-    sender: str
 
 
 @dataclass(frozen=True)
@@ -60,18 +50,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     real = parser.add_argument_group("real equipment")
     real.add_argument("--robot", metavar="URL", help="NAOqi of a real NAO, such as tcp://nao.local:9559 [RAPP_ROBOT]")
     real.add_argument("--cloud", metavar="URL", help="a running platform [RAPP_CLOUD; RAPP_TOKEN_FILE, RAPP_ROOT_FILE]")
-    real.add_argument("--smtp-host", help="a real mail account's server [RAPP_SMTP_HOST]")
-    real.add_argument("--smtp-port", type=int, help="its port (587) [RAPP_SMTP_PORT]")
-    real.add_argument("--smtp-user", help="its user [RAPP_SMTP_USER]; the password by RAPP_SMTP_PASSWORD or the file")
-    real.add_argument("--smtp-security", choices=("starttls", "tls", "none"), help="(starttls) [RAPP_SMTP_SECURITY]")
-    real.add_argument("--smtp-password-file", type=Path, help="file that holds the password [RAPP_SMTP_PASSWORD_FILE]")
-    real.add_argument("--mail-from", metavar="ADDRESS", help="the sender's address [RAPP_MAIL_FROM]")
+    mail_account.add_options(real)
     real.add_argument("--address", help="the recipient's mail address (default: one on the demo's own mail server)")
 
 
 def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> DemoConfig:
     """Build the configuration; raises UsageError when options contradict each other."""
-    account = _mail_account(options, env)
+    account = mail_account.read(options, env)
     if account and not options.address:
         raise UsageError("cannot use a real mail account without a real recipient: give --address NAME@DOMAIN")
     if not options.recipient.strip() or not options.message.strip():
@@ -87,22 +72,6 @@ def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> De
         mail=account,
         address=options.address or f"{_mailbox(options.recipient)}@home.example",
         timeout=options.timeout,
-    )
-
-
-def _mail_account(options: argparse.Namespace, env: Mapping[str, str]) -> MailAccount | None:
-    host = options.smtp_host or env.get("RAPP_SMTP_HOST")
-    if not host:
-        return None
-    password_file = options.smtp_password_file or env.get("RAPP_SMTP_PASSWORD_FILE")
-    user = options.smtp_user or env.get("RAPP_SMTP_USER", "")
-    return MailAccount(
-        host=host,
-        port=options.smtp_port or int(env.get("RAPP_SMTP_PORT", "587")),
-        user=user,
-        security=options.smtp_security or env.get("RAPP_SMTP_SECURITY", "starttls"),
-        password_file=Path(password_file) if password_file else None,
-        sender=options.mail_from or env.get("RAPP_MAIL_FROM", user),
     )
 
 

@@ -3,9 +3,9 @@
 import asyncio
 from dataclasses import dataclass
 
-from rapp_cli.demo.person import Person
-from rapp_cli.demo.timeline import Timeline
 from rapp_cli.errors import CommandError
+from rapp_cli.person import Person
+from rapp_cli.timeline import Timeline
 
 THINKING = 0.6  # s, between hearing the robot and answering: people do not answer at once, and recognisers start up
 PATIENCE = 15.0  # s without an answer after which the person asks again

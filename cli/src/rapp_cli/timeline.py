@@ -5,7 +5,7 @@ import json
 import sys
 import time
 from collections.abc import AsyncIterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -23,6 +23,13 @@ class Entry:
     state: str
     kind: str
     detail: str
+    time: float = field(default_factory=time.time)  # s since 1970, when it happened
+
+
+def append(record: Path, entry: Entry) -> None:
+    """Write one entry at the end of a file of JSON lines; several processes may write to one file."""
+    with record.open("a") as lines:
+        lines.write(json.dumps(asdict(entry)) + "\n")
 
 
 class Timeline:
@@ -39,8 +46,7 @@ class Timeline:
         """Keep one entry, print it unless it is a mere leaving or within a core service, wake those who wait."""
         self.entries.append(entry)
         if self._record is not None:
-            with self._record.open("a") as record:
-                record.write(json.dumps(asdict(entry)) + "\n")
+            append(self._record, entry)
         if entry.kind != "left" and "/" not in entry.state:
             self._print(entry)
         async with self._changed:
@@ -68,6 +74,12 @@ class Timeline:
                 after = len(self.entries)
                 await self._changed.wait()
 
+    async def entry(self, index: int) -> Entry:
+        """Wait for the entry of an index."""
+        async with self._changed:
+            await self._changed.wait_for(lambda: len(self.entries) > index)
+            return self.entries[index]
+
 
 async def follow(bridge: str) -> AsyncIterator[Entry]:
     """Subscribe to the agents' states at a rosbridge (ws://host:port); yields entries until the bridge leaves."""
@@ -79,6 +91,7 @@ async def follow(bridge: str) -> AsyncIterator[Entry]:
             message: dict[str, Any] = json.loads(text)
             if message.get("op") == "publish":
                 m = message["msg"]
-                yield Entry(m["agent"], m["machine"], m["state"], KINDS[m["kind"]], m["detail"])
+                moment = m["stamp"]["secs"] + m["stamp"]["nsecs"] * 1e-9
+                yield Entry(m["agent"], m["machine"], m["state"], KINDS[m["kind"]], m["detail"], moment)
     finally:
         socket.close()

@@ -1,0 +1,81 @@
+"""A platform for a robot: making one, or using one that runs already; what the robot's link is told of it."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from rapp_cli.errors import CommandError, UsageError
+from rapp_cli.mail_account import MailAccount
+from rapp_cli.paths import STORE
+
+USER = "Maria"  # whom the robot serves
+CONTACTS = {
+    "Doctor Nowak": "nowak@clinic.example",
+    "Margaret": "margaret@home.example",
+}
+"""People the user writes to, by name."""
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """A platform, and what a robot needs to be its robot."""
+
+    url: str
+    token_file: Path
+    root_file: Path
+
+
+def own_cloud(data: Path, port: int, robot: str) -> Cloud:
+    """The platform on this computer whose data lie in a folder."""
+    return Cloud(f"http://127.0.0.1:{port}", data / "robots" / f"{robot}.token", data / "root.json")
+
+
+def foreign_cloud(url: str, env: Mapping[str, str]) -> Cloud:
+    """A platform that runs already; raises UsageError when its address or what it gave this robot is missing."""
+    if urlsplit(url).scheme not in ("http", "https"):
+        raise UsageError(f"cannot use {url!r} as a platform: give a URL such as https://rapp.example:9001")
+    try:
+        return Cloud(url, Path(env["RAPP_TOKEN_FILE"]).absolute(), Path(env["RAPP_ROOT_FILE"]).absolute())
+    except KeyError as error:
+        raise UsageError(f"cannot use {url} without {error}: set it to the file the platform gave this robot") from None
+
+
+def make_platform(data: Path, robot: str) -> None:
+    """Make keys, a store and the robot's token, unless they are there. Raises CommandError."""
+    words = [sys.executable, "-m", "rapp_cloud", "init", "--data", str(data), "--robot", robot]
+    made = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    if made.returncode:
+        raise CommandError(f"cannot make the platform's keys in {data}: {made.stderr.strip()}")
+
+
+def write_profile(path: Path, contacts: Mapping[str, str]) -> None:
+    """Write the profile of the robot's user: who they are, whom they write to (name to mail address)."""
+    listed = [{"name": name, "address": address} for name, address in contacts.items()]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps({"name": USER, "language": "en", "contacts": listed}, indent=2))
+
+
+def own_rapps() -> list[Path]:
+    """Sources of the RApps that come with the repository."""
+    return [folder for folder in sorted(STORE.iterdir()) if folder.is_dir()]
+
+
+def link_environment(cloud: Cloud, account: MailAccount) -> dict[str, str]:
+    """What the robot's link is told by its environment; the mail password is not among it."""
+    values = {
+        "RAPP_CLOUD": cloud.url,
+        "RAPP_TOKEN_FILE": str(cloud.token_file),
+        "RAPP_ROOT_FILE": str(cloud.root_file),
+        "RAPP_SMTP_HOST": account.host,
+        "RAPP_SMTP_PORT": str(account.port),
+        "RAPP_SMTP_USER": account.user,
+        "RAPP_SMTP_SECURITY": account.security,
+        "RAPP_MAIL_FROM": account.sender,
+    }
+    if account.password_file is not None:
+        values["RAPP_SMTP_PASSWORD_FILE"] = str(account.password_file)
+    return values
