@@ -89,7 +89,7 @@ class Commands:
         return answer
 
     async def interpret(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
-        """{recording, language} → {rapp | null, confidence, text, candidates}."""
+        """{recording, language} → {rapp | null, confidence, text, candidates, choice}."""
         recording, language = take(arguments, recording=str, language=str)
         if not _LANGUAGE.fullmatch(language):
             raise Refused(f"cannot interpret the language {language[:20]!a}: give one such as en")

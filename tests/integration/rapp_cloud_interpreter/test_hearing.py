@@ -64,6 +64,17 @@ def test_foreign_sentence_names_none(interpreter, recording):
     assert "castle" in found.text
 
 
+def test_sentence_that_fits_two_is_asked_about(interpreter, recording):
+    commands = {
+        "voice_mail": ["send an e-mail", "I want to send a message to somebody", "I would like to dictate a letter"],
+        "letter": ["write a letter to my family", "send a letter to somebody", "I would like to write a letter"],
+        "clock": COMMANDS["clock"],
+    }
+    found = interpreter.interpret(recording("I would like to dictate a letter to my family"), commands)
+    assert found.rapp is None
+    assert sorted(found.choice) == ["letter", "voice_mail"]
+
+
 @pytest.mark.parametrize("level", [0.0, 0.05])
 def test_silence_and_noise_name_none(interpreter, tmp_path, level):
     file = tmp_path / "noise.wav"

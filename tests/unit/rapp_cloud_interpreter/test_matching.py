@@ -68,6 +68,24 @@ def test_two_rapps_with_the_same_sentences_are_doubted():
     assert meant("what time is it", commands=twins).confidence < meant("what time is it").confidence
 
 
+def test_rapps_that_fit_alike_are_asked_about_and_none_is_named():
+    twins = {**COMMANDS, "watch": COMMANDS["clock"]}
+    found = meant("what time is it", commands=twins, config=replace(CONFIG, sentences_compared=1))
+    assert (found.rapp, found.choice) == (None, ("clock", "watch"))
+    assert found.confidence >= CONFIG.threshold
+
+
+def test_not_more_than_three_are_asked_about():
+    many = dict.fromkeys(("clock", "watch", "hourglass", "sundial"), COMMANDS["clock"])
+    assert len(meant("what time is it", commands=many, config=replace(CONFIG, sentences_compared=1)).choice) == 3
+
+
+def test_nothing_is_asked_below_the_threshold_nor_about_one():
+    twins = {**COMMANDS, "watch": COMMANDS["clock"]}
+    assert meant("frozen rivers carry heavy ships", commands=twins).choice == ()
+    assert meant("what time is it", config=replace(CONFIG, sentences_compared=1)).choice == ()
+
+
 def test_rapp_without_rival_gets_no_margin_for_it():
     alone = {"clock": COMMANDS["clock"]}
     assert meant("what time is it", commands=alone).confidence < meant("what time is it").confidence

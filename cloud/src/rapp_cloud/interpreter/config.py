@@ -34,3 +34,8 @@ class InterpreterConfig:
     """and the constant."""
     threshold: float = 0.75
     """Confidence from which a RApp is named. 1 % wrong on the development set (cross-validated); below it: None."""
+    close: float = 0.15
+    """RApps above the threshold whose nearness is so little below the best are asked about. None of the development set's
+    commands and foreign sentences is asked about up to 0.3; "tell me the time and say hello to me" is 0.12 apart."""
+    most_asked: int = 3
+    """RApps of one question."""

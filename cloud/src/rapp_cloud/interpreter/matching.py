@@ -24,7 +24,7 @@ Texts = Sequence[tuple[str, float]]
 
 
 def match(texts: Texts, commands: Commands, meaning: Meaning, config: InterpreterConfig) -> Interpretation:
-    """The RApp that was meant; None when nothing was heard, there is no RApp, or the confidence is too low."""
+    """The RApp that was meant; None when nothing was heard, there is no RApp, the confidence is too low, or several fit."""
     heard = [(plain(text), chance) for text, chance in texts if plain(text)]
     offered = {name: list(sentences) for name, sentences in commands.items() if any(map(plain, sentences))}
     best_text = heard[0][0] if heard else ""
@@ -35,7 +35,10 @@ def match(texts: Texts, commands: Commands, meaning: Meaning, config: Interprete
     candidates = [(name, _confidence(nearness, name, config)) for name in ranked]
     candidates += [(name, 0.0) for name in sorted(commands.keys() - offered.keys())]
     best, confidence = candidates[0]
-    return Interpretation(best if confidence >= config.threshold else None, confidence, best_text, tuple(candidates))
+    good = [name for name, value in candidates if value >= config.threshold]
+    close = [name for name in good if nearness[best] - nearness[name] <= config.close][: config.most_asked]
+    named = best if len(close) == 1 else None
+    return Interpretation(named, confidence, best_text, tuple(candidates), tuple(close) if len(close) > 1 else ())
 
 
 def chances(worths: Sequence[float]) -> list[float]:

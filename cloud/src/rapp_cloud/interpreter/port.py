@@ -14,13 +14,15 @@ class Interpretation:
     """What a recording asks for (paper §III: the platform interprets the long command and names the RApp)."""
 
     rapp: str | None
-    """Name of the RApp, or None: not understood."""
+    """Name of the RApp, or None: not understood, or `choice` is to be asked about."""
     confidence: float
     """Probability, 0..1, that the best candidate is what was meant; `rapp` is None when it is too low."""
     text: str
     """The words that were heard, lower case; "" when nothing was."""
     candidates: tuple[tuple[str, float], ...]
     """(RApp, confidence 0..1), best first, every RApp of the catalogue once."""
+    choice: tuple[str, ...] = ()
+    """RApps that fit about as well as each other, best first: the person knows which is meant. Empty or at least two."""
 
 
 class Interpreter(Protocol):

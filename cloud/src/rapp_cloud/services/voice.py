@@ -25,7 +25,7 @@ def voice_services(robots: Robots, shelf: Shelf, interpret_in_worker: Interpret)
 
     @service(timeout=60, max_body=MAX_RECORDING)
     async def interpret(request: Request, recording: Path, language: str = "en", robot: str | None = None) -> dict[str, Any]:
-        """Name the RApp that a recorded sentence asks for; null when it is not understood."""
+        """Name the RApp that a recorded sentence asks for; null when it is not understood, or fits those of `choice`."""
         kind = robots.kind_of(robot_of(request, robot))
         manifests = await asyncio.to_thread(shelf.manifests)
         try:
@@ -37,6 +37,7 @@ def voice_services(robots: Robots, shelf: Shelf, interpret_in_worker: Interpret)
             "confidence": found.confidence,
             "text": found.text,
             "candidates": [{"rapp": rapp, "confidence": confidence} for rapp, confidence in found.candidates],
+            "choice": list(found.choice),
         }
 
     return [interpret]
