@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from rapp_api import Behaviour, DynamicAgent, Edge, Machine, RappError, Subsystem, cloud
+from rapp_api import Behaviour, DynamicAgent, Edge, Machine, RappError, Refused, Subsystem, Unreachable, cloud
 from rapp_api.communication import EMPTY, rapp_recognize, rapp_record, rapp_say
 
 TRIES = 3  # how often the recipient's name is asked for
@@ -70,17 +70,23 @@ class VoiceMail(DynamicAgent):
         share.memory["recording"] = rapp_record(float(self.parameters.get("message_seconds", MESSAGE_SECONDS)))
 
     def _send(self, share: Subsystem) -> None:
-        share.memory["sent"] = cloud.send_mail_wait(
-            [str(share.memory["address"])],
-            f"Voice message from {self._sender}",
-            f"{self._sender} has recorded a voice message for you; it is attached.\n",
-            str(share.memory["recording"]),
-        )
+        subject = f"Voice message from {self._sender}"
+        body = f"{self._sender} has recorded a voice message for you; it is attached.\n"
+        try:
+            sent = cloud.send_mail_wait([str(share.memory["address"])], subject, body, str(share.memory["recording"]))
+        except Refused:
+            sent = "refused"
+        except Unreachable:
+            sent = "lost"
+        share.memory["sent"] = sent
 
     def _end(self, share: Subsystem) -> None:
         endings = {
             "delivered": f"I have finished, your message to {share.memory['recipient']} is sent",
             "kept": "I cannot reach the mail server, I keep your message and send it later",
+            "locked": "the mail server does not let me in, I keep your message and send it when it does",
+            "refused": f"the mail server refuses your message to {share.memory['recipient']}, I cannot send it",
+            "lost": "I am sorry, I could not send your message, please try again later",
             None: "I am sorry, I do not know to whom I should write",
         }
         rapp_say(endings[share.memory.get("sent")])  # type: ignore[index]

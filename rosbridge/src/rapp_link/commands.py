@@ -120,7 +120,10 @@ class Commands:
         return await self._platform.call(service, values, ticket.remaining)
 
     async def send_mail(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
-        """{recipients, subject, body, attachment, message_id} → {state: delivered | kept, message_id}.
+        """{recipients, subject, body, attachment, message_id} → {state: delivered | kept | locked, message_id}.
+
+        Kept, to be sent later, because the server is away or says "later"; locked: kept too, because the server does not
+        let the robot's account in.
 
         Once the mail is in the outbox it goes out, also when the job is cancelled or its caller has gone.
         """
@@ -186,7 +189,8 @@ def _told(letter: Letter) -> dict[str, str]:
         others = [name for name in letter.recipients if name not in letter.refused]
         rest = f" ({', '.join(others)}: {'kept' if letter.pending else 'delivered'})" if others else ""
         raise Refused(f"cannot deliver to {words}{rest}")
-    return {"state": "delivered" if letter.state == "sent" else "kept", "message_id": letter.message_id}
+    state = "delivered" if letter.state == "sent" else "locked" if letter.locked else "kept"
+    return {"state": state, "message_id": letter.message_id}
 
 
 async def sign_of_life(publish: Any, platform: Platform, boot: str, every: float) -> None:

@@ -1,10 +1,11 @@
 """One mail's way: queued, then sent or refused. Pure; the outbox keeps it on the disk.
 
-    queued --all accepted--> sent
-    queued --some accepted, the others refused for good--> sent (with `refused` naming them)
-    queued --all refused for good--> refused
-    queued --any "later", or no answer--> queued, for those recipients only
-    queued --too old--> refused
+queued --all accepted--> sent
+queued --some accepted, the others refused for good--> sent (with `refused` naming them)
+queued --all refused for good--> refused
+queued --any "later", or no answer--> queued, for those recipients only
+queued --the robot's account not let in--> queued, and locked until a try gets further
+queued --too old--> refused
 """
 
 import json
@@ -24,6 +25,7 @@ class Outcome:
     accepted: tuple[str, ...] = ()
     refused: Mapping[str, str] = field(default_factory=dict)  # for good, with the server's words
     later: Mapping[str, str] = field(default_factory=dict)  # not now, with the server's words
+    locked: bool = False  # the server does not let the robot's account in; somebody has to mend that
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class Letter:
     pending: tuple[str, ...]  # recipients the server has neither taken nor refused
     refused: Mapping[str, str] = field(default_factory=dict)  # recipient: server's words
     tries: int = 0
+    locked: bool = False  # at the last try, see `Outcome`
 
     @property
     def state(self) -> State:
@@ -51,7 +54,8 @@ class Letter:
         answered = {*outcome.accepted, *outcome.refused}
         refused = {name: words for name, words in outcome.refused.items() if name in self.pending}
         pending = tuple(name for name in self.pending if name not in answered)
-        return replace(self, pending=pending, refused={**self.refused, **refused}, tries=self.tries + 1)
+        everywhere = {**self.refused, **refused}
+        return replace(self, pending=pending, refused=everywhere, tries=self.tries + 1, locked=outcome.locked)
 
 
 def to_json(letter: Letter) -> bytes:
@@ -75,6 +79,7 @@ def from_json(data: bytes) -> Letter:
             pending=tuple(map(str, fields["pending"])),
             refused={str(name): str(words) for name, words in fields["refused"].items()},
             tries=int(fields["tries"]),
+            locked=bool(fields.get("locked", False)),
         )
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise Invalid(f"cannot read a letter of the outbox: {error}") from None

@@ -10,7 +10,7 @@ from rapp_hop.errors import HopError, Refused
 from rapp_link.config import MailConfig
 from rapp_link.letter import Letter, Outcome
 from rapp_link.outbox import Outbox
-from rapp_link.smtp import Sender
+from rapp_link.smtp import Locked, Sender
 from rapp_link.threads import in_thread
 
 _log = logging.getLogger(__name__)
@@ -103,7 +103,7 @@ class Postman:
             return Outcome(refused=dict.fromkeys(letter.pending, str(error)))
         except HopError as error:
             _log.warning("%s", error)
-            return Outcome(later=dict.fromkeys(letter.pending, str(error)))
+            return Outcome(later=dict.fromkeys(letter.pending, str(error)), locked=isinstance(error, Locked))
 
     def _plan(self, letter: Letter) -> None:
         pause = min(self._config.retry_first * 2.0 ** min(letter.tries - 1, 20), self._config.retry_most)

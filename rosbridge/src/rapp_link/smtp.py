@@ -16,6 +16,12 @@ from rapp_link.config import MailConfig
 from rapp_link.letter import Outcome
 from rapp_link.threads import in_thread
 
+ACCOUNT = frozenset({530, 534, 535, 538})  # RFC 4954 §6: it is not the mail that is refused, but who sends it
+
+
+class Locked(Unreachable):
+    """The server does not let the robot's account in: not now, and not before somebody has mended it."""
+
 
 class Sender(Protocol):
     """Hands a mail over."""
@@ -23,7 +29,8 @@ class Sender(Protocol):
     async def send(self, sender: str, recipients: Sequence[str], content: bytes) -> Outcome:
         """Try once.
 
-        :raises Refused: the server refuses the mail or the account for good; the text has its words
+        :raises Refused: the server refuses the mail for good; the text has its words
+        :raises Locked: it does not let the account in
         :raises Unreachable: not now
         :raises Invalid: the server's encryption or answers cannot be trusted; not now either
         """
@@ -113,9 +120,10 @@ def _cut(server: smtplib.SMTP) -> None:
 
 def _outcome(recipients: Sequence[str], refused: Mapping[str, tuple[int, bytes]]) -> Outcome:
     words = {name: _words(code, text) for name, (code, text) in refused.items()}
-    good = {name: text for name, text in words.items() if refused[name][0] >= 500}
+    good = {name: text for name, text in words.items() if refused[name][0] >= 500 and refused[name][0] not in ACCOUNT}
     later = {name: text for name, text in words.items() if name not in good}
-    return Outcome(tuple(name for name in recipients if name not in words), good, later)
+    locked = any(refused[name][0] in ACCOUNT for name in later)
+    return Outcome(tuple(name for name in recipients if name not in words), good, later, locked)
 
 
 def _words(code: int, text: bytes | str) -> str:
@@ -130,12 +138,10 @@ def _translated(config: MailConfig) -> Iterator[None]:
         yield
     except HopError:
         raise
-    except smtplib.SMTPAuthenticationError as error:
-        raise _said(where, "log in at", error.smtp_code, error.smtp_error) from None
     except smtplib.SMTPResponseException as error:
-        raise _said(where, "send by", error.smtp_code, error.smtp_error) from None
+        raise _said(where, error) from None
     except smtplib.SMTPNotSupportedError as error:
-        raise Refused(f"cannot send by {where}: {error}") from None
+        raise Locked(f"cannot log in at {where}: {error}, give no account or another server") from None
     except smtplib.SMTPServerDisconnected:
         raise Unreachable(f"cannot send by {where}: the connection was cut, it is tried again") from None
     except ssl.SSLCertVerificationError as error:
@@ -144,6 +150,11 @@ def _translated(config: MailConfig) -> Iterator[None]:
         raise Unreachable(f"cannot reach the mail server {where}: {error}, it is tried again") from None
 
 
-def _said(where: str, what: str, code: int, text: bytes | str) -> HopError:
-    leaf = Refused if code >= 500 else Unreachable
-    return leaf(f"cannot {what} {where}: the server says {_words(code, text)}")
+def _said(where: str, error: smtplib.SMTPResponseException) -> HopError:
+    words = f"the server says {_words(error.smtp_code, error.smtp_error)}"
+    if isinstance(error, smtplib.SMTPAuthenticationError) or error.smtp_code in ACCOUNT:
+        return Locked(f"cannot log in at {where}: {words}, check name and password of the account")
+    # A refusal for good is the mail's only when the server has seen something of the mail: sender, recipients, content.
+    mail = isinstance(error, smtplib.SMTPSenderRefused | smtplib.SMTPDataError)
+    leaf = Refused if mail and error.smtp_code >= 500 else Unreachable
+    return leaf(f"cannot send by {where}: {words}")

@@ -12,13 +12,13 @@ from typing import Any, TypeVar
 
 import pytest
 
-from rapp_hop.errors import Invalid, Refused, Unreachable
+from rapp_hop.errors import Invalid, Unreachable
 from rapp_link.config import MailConfig
 from rapp_link.letter import Letter
 from rapp_link.message import Attachment, Mail, build
 from rapp_link.outbox import Outbox
 from rapp_link.postman import Postman
-from rapp_link.smtp import SmtpSender
+from rapp_link.smtp import Locked, SmtpSender
 
 PASSWORD = "correct horse: battery"
 SENDER = "nao@home.example"
@@ -73,9 +73,7 @@ def guarded(start_mail: Any, certificate: Any, users_file: Path) -> Any:
 
 
 def test_a_mail_goes_by_starttls_and_login(guarded: Any, certificate: Any, outbox: Outbox, tmp_path: Path) -> None:
-    config = account(
-        guarded.ready["port"], security="starttls", ca_file=certificate.certificate, user="nao", password=PASSWORD
-    )
+    config = account(guarded.ready["port"], security="starttls", ca_file=certificate.certificate, user="nao", password=PASSWORD)
     letter = sent(config, outbox, mail("<1@nao>"))
     assert (letter.state, letter.tries) == ("sent", 1)
     (message,) = arrived(tmp_path)
@@ -83,18 +81,28 @@ def test_a_mail_goes_by_starttls_and_login(guarded: Any, certificate: Any, outbo
     assert PASSWORD not in (tmp_path / "rapp_cloud.mail.log").read_text()
 
 
-def test_a_wrong_password_is_refused_with_the_servers_words(guarded: Any, certificate: Any, outbox: Outbox, tmp_path: Path) -> None:
-    config = account(guarded.ready["port"], security="starttls", ca_file=certificate.certificate, user="nao", password="x")
+@pytest.mark.parametrize("login", [{"user": "nao", "password": "x"}, {}], ids=["wrong password", "no login"])
+def test_a_mail_waits_until_the_account_is_mended(
+    guarded: Any, certificate: Any, outbox: Outbox, tmp_path: Path, login: dict[str, str]
+) -> None:
+    config = account(guarded.ready["port"], security="starttls", ca_file=certificate.certificate, **login)
     letter = sent(config, outbox, mail("<1@nao>"))
-    assert letter.state == "refused"
-    assert "535" in letter.refused["zofia@home.example"]
+    assert (letter.state, letter.locked) == ("queued", True)
     assert arrived(tmp_path) == []
+    mended = replace(config, user="nao", password=PASSWORD)
+    assert sent(mended, Outbox(tmp_path / "outbox", 20), mail("<1@nao>")).state == "sent"
+    assert len(arrived(tmp_path)) == 1
 
 
-def test_without_login_the_server_takes_nothing(guarded: Any, certificate: Any, outbox: Outbox, tmp_path: Path) -> None:
-    letter = sent(account(guarded.ready["port"], security="starttls", ca_file=certificate.certificate), outbox, mail("<1@nao>"))
-    assert (letter.state, "530" in letter.refused["zofia@home.example"]) == ("refused", True)
-    assert arrived(tmp_path) == []
+def test_a_wrong_password_is_told_in_the_servers_words(guarded: Any, certificate: Any) -> None:
+    config = account(guarded.ready["port"], security="starttls", ca_file=certificate.certificate, user="nao", password="x")
+    with pytest.raises(Locked, match="535"):
+        send_bare(config)
+
+
+def test_a_server_without_login_locks_the_account_out(start_mail: Any) -> None:
+    with pytest.raises(Locked, match="AUTH"):
+        send_bare(account(start_mail().ready["port"], user="nao", password=PASSWORD))
 
 
 def send_bare(config: MailConfig) -> None:
@@ -196,7 +204,7 @@ def test_a_server_that_trickles_holds_nobody(outbox: Outbox) -> None:
         assert not thread.is_alive()
 
 
-def test_a_refusal_at_the_greeting_is_told_in_the_servers_words() -> None:
+def test_a_refusal_at_the_greeting_is_told_in_the_servers_words_and_is_not_the_mails() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
 
         def refuse() -> None:
@@ -206,6 +214,6 @@ def test_a_refusal_at_the_greeting_is_told_in_the_servers_words() -> None:
 
         thread = threading.Thread(target=refuse)
         thread.start()
-        with pytest.raises(Refused, match=r"554 no mail \[31m from robots"):
+        with pytest.raises(Unreachable, match=r"554 no mail \[31m from robots"):
             send_bare(account(listener.getsockname()[1]))
         thread.join(10)

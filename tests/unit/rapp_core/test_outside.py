@@ -36,10 +36,15 @@ def messages() -> list[str]:
 
 
 @pytest.fixture
-def outside(link: FakeLink, messages: list[str]) -> Outside:
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def outside(link: FakeLink, messages: list[str], clock: Clock) -> Outside:
     trace = Trace()
     trace.listen(lambda happening: messages.append(happening.detail))
-    return Outside(link, Config(name="nao7"), trace)
+    return Outside(link, Config(name="nao7"), trace, clock.event(), clock.now)
 
 
 def test_a_permitted_call_is_passed_on_and_answered(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
@@ -86,7 +91,32 @@ def test_only_recordings_of_the_run_leave_the_robot(outside: Outside, agent: Fak
     assert link.asked == []
 
 
-def test_a_link_that_is_away_is_told(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
+def test_a_link_that_stays_away_is_told_after_a_bound(outside: Outside, agent: FakeAgent, link: FakeLink, clock: Clock) -> None:
     link.away = True
     with pytest.raises(Unreachable):
         outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
+    assert Config.link_back - 1.0 < clock.time <= Config.link_back
+
+
+def test_a_link_that_comes_back_is_given_the_same_mail_again(
+    outside: Outside, agent: FakeAgent, link: FakeLink, clock: Clock
+) -> None:
+    link.away = True
+    clock.at(5.0, lambda: setattr(link, "away", False))
+    assert outside.send_mail(agent, ["e@home.example"], "subject", "body", "") == "kept"
+    assert len(link.asked) > 1
+    assert len({arguments["message_id"] for _, arguments in link.asked}) == 1
+
+
+def test_nobody_waits_for_the_link_when_the_run_is_over(outside: Outside, agent: FakeAgent, link: FakeLink, clock: Clock) -> None:
+    link.away, agent.alive = True, False
+    with pytest.raises(Unreachable):
+        outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
+    assert clock.time == 0.0
+
+
+def test_a_mail_that_is_refused_is_not_tried_again(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
+    link.errors["send_mail"] = Refused("cannot deliver to e@home.example: 550")
+    with pytest.raises(Refused):
+        outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
+    assert link.names() == ["send_mail"]

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rapp_api import DynamicAgent, RappError, Unreachable
+from rapp_api import DynamicAgent, RappError, Refused, Unreachable
 from rapp_api.entry import load
 from rapp_api.testing import FakeCoreAgent
 
@@ -56,6 +56,19 @@ def test_voice_mail_gives_up_after_three_names_it_has_not_understood() -> None:
 def test_voice_mail_says_that_a_message_is_kept() -> None:
     core = run("voice_mail", hears=["Elizabeth"], services={"profile": PROFILE}, mail="kept")
     assert "later" in core.said()[-1]
+
+
+@pytest.mark.parametrize(
+    ("mail", "words"),
+    [
+        ("locked", "does not let me in, I keep"),
+        (Refused("cannot deliver to elizabeth@home.example: 550"), "refuses your message to Elizabeth"),
+        (Unreachable("cannot reach the link"), "could not send"),
+    ],
+)
+def test_voice_mail_says_why_a_message_is_not_sent(mail: Any, words: str) -> None:
+    core = run("voice_mail", hears=["Elizabeth"], services={"profile": PROFILE}, mail=mail)
+    assert words in core.said()[-1]
 
 
 @pytest.mark.parametrize("profile", [{"name": "Maria", "contacts": []}, Unreachable("cannot reach the platform")])

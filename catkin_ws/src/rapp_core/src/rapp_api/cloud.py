@@ -36,8 +36,10 @@ def call(
 
 
 def send_mail_wait(recipients: Sequence[str], subject: str, body: str, attachment: str = "") -> str:
-    """Send a mail and wait: "delivered", or "kept" when it will be sent later. Raises RappError when it cannot be sent.
+    """Send a mail and wait; gives "delivered", or "kept" or "locked" when it will be sent later. Raises RappError.
 
+    "kept": the mail server is away or busy; "locked": it does not let the robot's account in, until somebody mends that.
+    Refused: the server does not take this mail, such as for an address it does not know.
     `attachment` is the path of one of this run's recordings.
     """
     return current().send_mail(list(recipients), subject, body, attachment)

@@ -29,7 +29,7 @@ class CoreAgent(Protocol):
         """Call a HOP service of the repository agent; gives its JSON result."""
 
     def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
-        """Send a mail; gives "delivered" or "kept"."""
+        """Send a mail; gives "delivered", "kept" or "locked" (see `rapp_api.cloud.send_mail_wait`)."""
 
     def pause(self, seconds: float) -> None:
         """Let time pass; the core agent is told that the dynamic agent means to wait."""

@@ -22,7 +22,7 @@ class FakeCoreAgent:
     """Implements `CoreAgent` in memory, with the real one's limits, and notes every call in `calls` as (name, argument).
 
     `hears` are the words the person says, one for each time the robot listens ("" for silence); `services` gives for each HOP
-    service its result, a function of its arguments, or the RappError it ends with; `mail` is "delivered", "kept" or a
+    service its result, a function of its arguments, or the RappError it ends with; `mail` is "delivered", "kept", "locked" or a
     RappError; with `package`, the folder of the RApp, calls that its package.json does not name are refused.
     """
 

@@ -71,7 +71,7 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     executor, hop = Executor(Context(nao, config, trace, config.home / "listening", cut=stop)), RosHop(stop)
     platform = Platform(hop, config, trace)
     control = Control(Parts(nao, hop, launcher, executor, platform, lease, trace, config, stop))
-    RosServices(executor, Outside(hop, config, trace), lease, trace)
+    RosServices(executor, Outside(hop, config, trace, stop), lease, trace)
     machine, rejoining = core_machine(control), Rejoining()
     machine.listen(trace.core_event)
     threading.Thread(target=_hush_at_end, args=(nao.voice, stop), name="hush", daemon=True).start()

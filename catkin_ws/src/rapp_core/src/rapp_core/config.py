@@ -51,6 +51,7 @@ class Config:
     install_timeout: float = 60.0  # s
     cloud_call_timeout: float = 30.0  # s for a dynamic agent's cloud call unless told otherwise
     mail_timeout: float = 60.0  # s
+    link_back: float = 15.0  # s from a mail's first try in which a link that is away may come back and take it
     warm_up: float = 20.0  # s for a spare to import rospy and join ROS
     first_word: float = 15.0  # s from activation to the dynamic agent's first word
     heartbeat: float = 1.0  # s without a heartbeat after which the lease is silent

@@ -2,23 +2,32 @@
 
 import itertools
 import json
-from collections.abc import Sequence
+import threading
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from rapp_core.config import Config
-from rapp_core.errors import Invalid, Refused
+from rapp_core.errors import Invalid, Refused, Unreachable
 from rapp_core.ports import Agent, Hop
 from rapp_core.trace import Trace
+
+MAIL_AGAIN = 0.5  # s between tries to hand a mail to a link that is away
 
 
 class Outside:
     """rapp_cloud_call and rapp_send_mail; a RApp may use only what its package.json names."""
 
-    def __init__(self, hop: Hop, config: Config, trace: Trace) -> None:
+    def __init__(
+        self, hop: Hop, config: Config, trace: Trace, stop: threading.Event, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        """No new try after `stop` is set."""
         self._hop = hop
         self._config = config
         self._trace = trace
+        self._stop = stop
+        self._now = now
         self._numbers = itertools.count(1)
 
     def cloud_call(self, run: Agent, service: str, arguments: str, timeout: float) -> str:
@@ -37,7 +46,7 @@ class Outside:
         return json.dumps(result)
 
     def send_mail(self, run: Agent, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
-        """Have a mail sent (paper Fig. 12); gives "delivered" or "kept". Raises Refused, Unreachable, Invalid, Bug."""
+        """Have a mail sent (paper Fig. 12); gives "delivered", "kept" or "locked". Raises Refused, Unreachable, Invalid, Bug."""
         self._allowed(run, "send_mail")
         if attachment and not Path(attachment).resolve().is_relative_to(run.recordings.resolve()):
             raise Refused(f"cannot attach {attachment}: only recordings of this run may leave the robot")
@@ -49,9 +58,21 @@ class Outside:
             "message_id": f"<{run.name}.{next(self._numbers)}@{self._config.name}.rapp>",
         }
         self._trace.message("dynamic->mail server request (SMTP)")
-        state = str(self._hop.request("send_mail", mail, self._config.mail_timeout)["state"])
+        state = self._hand_over(run, mail)
         self._trace.message(f"mail server->dynamic reply {state}")
         return state
+
+    def _hand_over(self, run: Agent, mail: dict[str, Any]) -> str:
+        """A link that goes away meanwhile is given the mail again: it knows by the Message-ID what it has already."""
+        begun, whole = self._now(), self._config.mail_timeout
+        while True:
+            left = begun + whole - self._now()
+            try:
+                return str(self._hop.request("send_mail", mail, left)["state"])
+            except Unreachable:
+                late = self._now() + MAIL_AGAIN >= begun + min(self._config.link_back, whole)
+                if late or not run.alive or self._stop.wait(MAIL_AGAIN):
+                    raise
 
     @staticmethod
     def _allowed(run: Agent, service: str) -> None:
