@@ -3,6 +3,7 @@
 import asyncio
 import os
 from collections.abc import Callable
+from pathlib import Path
 
 os.environ.setdefault("QI_LOG_LEVEL", "1")  # libqi reads it when loaded, and logs on stdout
 
@@ -14,9 +15,9 @@ CALL_TIMEOUT = 60_000  # ms, for a whole spoken message
 
 
 class Person:
-    """Somebody in the robot's room; `on_speech` is told what they say as they begin."""
+    """Somebody in the robot's room with an espeak-ng voice; `on_speech` is told what they say as they begin."""
 
-    def __init__(self, robot: str, voice: str, on_speech: Callable[[str], None]) -> None:
+    def __init__(self, robot: str, voice: str, on_speech: Callable[[str], None] = lambda _text: None) -> None:
         self._robot = robot
         self._voice = voice
         self._on_speech = on_speech
@@ -50,6 +51,12 @@ class Person:
         self._on_speech(text)
         world, voice = self._world, self._voice
         await asyncio.to_thread(lambda: world.personSay(text, voice, _async=True).value(CALL_TIMEOUT))
+
+    async def play(self, recording: Path) -> None:
+        """Say what is in a recording; returns when it has been played."""
+        assert self._world is not None
+        world = self._world
+        await asyncio.to_thread(lambda: world.personPlay(str(recording), _async=True).value(CALL_TIMEOUT))
 
     async def leave(self) -> None:
         """Go: the robot is heard no longer."""

@@ -32,6 +32,24 @@ def append(record: Path, entry: Entry) -> None:
         lines.write(json.dumps(asdict(entry)) + "\n")
 
 
+def latest(record: Path, size: int = 1 << 18) -> list[Entry]:
+    """The last entries of such a file, as many as fit into `size` bytes; none when there is no file."""
+    try:
+        with record.open("rb") as lines:
+            lines.seek(max(0, record.stat().st_size - size))
+            found = lines.read().splitlines()
+    except FileNotFoundError:
+        return []
+    return [entry for entry in map(_entry, found) if entry is not None]
+
+
+def _entry(line: bytes) -> Entry | None:
+    try:
+        return Entry(**json.loads(line))
+    except (ValueError, TypeError):
+        return None  # the first of them may be cut in two, the last one unfinished
+
+
 class Timeline:
     """Prints entries with the seconds since the start, keeps them, and records them as JSON lines when given a file."""
 
