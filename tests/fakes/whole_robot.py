@@ -28,11 +28,13 @@ ORDER = ("roscore", "mail", "cloud", "nao_sim", "rosbridge", "link", "core_agent
 WATCHER = """
 import json, rospy
 from rapp_msgs.msg import AgentState
+from rapp_ros.rejoin import Rejoining
 KINDS = ("entered", "left", "failed", "said", "heard", "message")
 def tell(m):
     print(json.dumps([m.agent, m.machine, m.state, KINDS[m.kind], m.detail]), flush=True)
 rospy.init_node("watcher", anonymous=True, disable_rosout=True)
 rospy.Subscriber("/core_agent/state", AgentState, tell, queue_size=10_000)
+rejoining = Rejoining()
 print("READY {}", flush=True)
 rospy.spin()
 """
@@ -141,8 +143,7 @@ class WholeRobot:
 
     def close(self) -> None:
         """End everything, last started first."""
-        for name in list(self._frozen):
-            self.thaw(name)
+        self.thaw_all()
         if self._connection is not None:
             self._connection.close()
         while self._children:
@@ -163,6 +164,7 @@ class WholeRobot:
     def kill(self, name: str) -> None:
         """SIGKILL to one process, not to its children; it is reaped."""
         child = self._children.pop(name)
+        self._frozen.discard(name)
         child._process.kill()
         child.end(PATIENCE)
 
@@ -175,6 +177,10 @@ class WholeRobot:
         self._frozen.discard(name)
         with suppress(ProcessLookupError):
             os.killpg(self.pid(name), signal.SIGCONT)
+
+    def thaw_all(self) -> None:
+        for name in list(self._frozen):
+            self.thaw(name)
 
     # the person, and what is seen
 
