@@ -24,6 +24,7 @@ from rapp_hop.streaming import Progress, Sink, Writer
 MAX_ANSWER = 16 * 2**20  # bytes of one JSON answer
 MAX_UPLOAD = 64 * 2**20  # bytes of one request with its files
 OVERRUN = 2**20  # bytes of a download beyond its limit before the connection is cut
+IDLE = 10.0  # seconds in which nothing comes of a download before it is given up
 CLIENTS = 64  # calls of one client on the wire at once; more wait, so that one slow call does not hold up the next
 
 _log = logging.getLogger(__name__)
@@ -99,7 +100,7 @@ class HopClient:
         What was written before an error stays: write aside and rename.
 
         :param limit: bytes; one more is `Invalid`
-        :param timeout: seconds for the whole transfer, so a trickling server cannot hold it
+        :param timeout: seconds for the whole transfer, so a trickling server cannot hold it; silence ends it after `IDLE`
         :raises HopError: `Refused` for 4xx (with `.status`), `Unreachable`, `Invalid`
         """
         url = path if urlsplit(path).scheme else f"{self.base_url}/{path.lstrip('/')}"
@@ -158,8 +159,13 @@ class HopClient:
         # An instance of its own: the bound on the body is the client's, not the request's. It is wider than ours, so
         # that the sink sees the first byte too many and can say what was wrong.
         client = SimpleAsyncHTTPClient(force_instance=True, max_clients=1, max_body_size=limit + OVERRUN)
+        loop = asyncio.get_running_loop()
         try:
-            response = await self._fetch(client, request, timeout)
+            async with asyncio.timeout(IDLE) as silence:
+                sink.on_piece = lambda: silence.reschedule(loop.time() + IDLE)
+                response = await self._fetch(client, request, timeout)
+        except TimeoutError:
+            raise Unreachable(f"cannot fetch {url}: nothing came for {IDLE:g} s, try again later") from None
         except Unreachable:
             sink.check()
             raise

@@ -6,10 +6,12 @@ from typing import ClassVar
 class HopError(Exception):
     """Root of all errors of this package.
 
-    `kind` is the wire word; `status` the HTTP status it came with, when there was one.
+    `kind` is the wire word; `status` the HTTP status it came with, when there was one; `reason` a word for programs that
+    says what exactly was wrong, where that makes a difference to who is told.
     """
 
     kind: ClassVar[str] = "bug"
+    reason: str = ""
 
     def __init__(self, message: str, status: int | None = None) -> None:
         super().__init__(message)

@@ -13,6 +13,7 @@ class Sink:
 
     def __init__(self, url: str, write: Writer, limit: int, on_progress: Progress | None) -> None:
         self.received = 0  # bytes
+        self.on_piece: Callable[[], object] = lambda: None
         self._url = url
         self._write = write
         self._limit = limit
@@ -40,6 +41,7 @@ class Sink:
         """
         if self._status != 200 or self._wrong is not None or self._stopped:
             return
+        self.on_piece()
         self.received += len(piece)
         if self.received > self._limit:
             self._too_long()

@@ -66,7 +66,13 @@ class Platform:
         return await self._register(identity, patience)
 
     async def call(self, service: str, arguments: dict[str, Any], timeout: float, **files: Path) -> Any:
-        """Call a service of the platform; see `HopClient.call`."""
+        """Call a service of the platform, registering again when it has been started anew; see `HopClient.call`."""
+        try:
+            return await self._client.call(service, arguments, files, timeout)
+        except Refused:
+            if self._identity is None or not self._registered or await self._heartbeat():
+                raise
+            await self._register(self._identity, timeout)
         return await self._client.call(service, arguments, files, timeout)
 
     def hurry(self) -> None:

@@ -1,5 +1,6 @@
 """What the core is told of a job: rapp_msgs/HopEvent as a value. Pure."""
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,7 @@ class Event:
     fraction: float = 0.0  # 0..1 of the phase
     error: str = ""
     message: str = ""
-    result: str = ""  # JSON
+    result: str = ""  # JSON; of a failed job an object with the error's reason, where it has one
 
     def fields(self) -> dict[str, Any]:
         """Return the fields of the ROS message."""
@@ -37,4 +38,5 @@ def done(job: str, result: str) -> Event:
 
 def failed(job: str, error: HopError) -> Event:
     """Tell why there is none."""
-    return Event(job, FAILED, error=error.kind, message=str(error))
+    result = json.dumps({"reason": error.reason}) if error.reason else ""
+    return Event(job, FAILED, error=error.kind, message=str(error), result=result)

@@ -36,9 +36,7 @@ class Platform:
     port: int = 0
 
     def command(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "rapp_cloud", *words], capture_output=True, text=True, timeout=60, check=False
-        )
+        return subprocess.run([sys.executable, "-m", "rapp_cloud", *words], capture_output=True, text=True, timeout=60, check=False)
 
     def start(self, *words: str) -> None:
         whole = [sys.executable, "-m", "rapp_cloud", "--port", "0", "--data", str(self.data), "--workers", "1", *words]
@@ -215,9 +213,7 @@ def test_s20_the_same_version_with_other_bytes_is_refused(platform: Platform, tm
 def test_ends_with_its_children(platform: Platform, number: int) -> None:
     platform.start()
     assert platform.process is not None
-    group = subprocess.run(
-        ["ps", "-o", "pid=", "--ppid", str(platform.process.pid)], capture_output=True, text=True, check=True
-    )
+    group = subprocess.run(["ps", "-o", "pid=", "--ppid", str(platform.process.pid)], capture_output=True, text=True, check=True)
     children = [int(word) for word in group.stdout.split()]
     assert children
     assert platform.stop(number) == 0
@@ -303,6 +299,25 @@ def test_s05_an_old_copy_of_the_store_is_rollback(platform: Platform, tmp_path: 
         error = await failure(delivery.install("hello"))
         assert isinstance(error, Untrusted)
         assert error.attack == Attack.ROLLBACK
+
+    platform.run(test)
+
+
+def test_a_package_older_than_the_installed_one_is_not_fetched(platform: Platform, tmp_path: Path) -> None:
+    platform.start("--publish", str(source_folder(tmp_path, version="1.0.9")))
+    here = source_folder(tmp_path / "robot/rapps", version="1.0.10")
+    (tmp_path / "robot/rapps/hello").mkdir()
+    here.rename(tmp_path / "robot/rapps/hello/1.0.10")
+    (tmp_path / "robot/rapps/hello/current").symlink_to("1.0.10")
+
+    async def test(client: HopClient) -> None:
+        phases: list[str] = []
+        delivery = Delivery(client, platform.root, tmp_path / "robot")
+        error = await failure(delivery.install("hello", on_phase=lambda phase, _: phases.append(phase)))
+        assert isinstance(error, Untrusted)
+        assert error.attack == Attack.ROLLBACK
+        assert phases == []
+        assert (await delivery.install("hello", "1.0.9")).version == "1.0.9"  # who names it, means it
 
     platform.run(test)
 

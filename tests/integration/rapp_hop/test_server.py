@@ -408,6 +408,21 @@ def test_s10_a_trickling_download_ends_in_time(tmp_path: Path) -> None:
     asyncio.run(main())
 
 
+def test_a_download_of_which_nothing_comes_ends_before_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rapp_hop.client.IDLE", 0.5)
+
+    async def main() -> None:
+        half = b"HTTP/1.1 200 OK\r\nContent-Length: 9000\r\n\r\nhalf"
+        async with Line(half, endless=b"x", pause=1000) as url, asyncio.timeout(20):
+            error = await failure(HopClient(url).download("/x", tmp_path / "x", 10_000, timeout=1000))
+            assert isinstance(error, Unreachable)
+        slow = Line(b"HTTP/1.1 200 OK\r\nContent-Length: 8\r\n\r\n", endless=b"x", pause=0.1)
+        async with slow as url:
+            assert await HopClient(url).download("/x", tmp_path / "x", 10_000, timeout=1000) == 8
+
+    asyncio.run(main())
+
+
 def test_a_download_tells_its_progress_and_a_full_disk(tmp_path: Path) -> None:
     async def main() -> None:
         told: list[tuple[int, int | None]] = []

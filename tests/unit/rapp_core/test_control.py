@@ -288,6 +288,32 @@ def test_a_download_that_fails(home: Home, error: Unreachable | Refused | Invali
     assert failing_round(home) == (["s3", "s4", "s6", "s11", "s3"], [words])
 
 
+@pytest.mark.parametrize(
+    ("reason", "words"),
+    [
+        ("wrong hash or length", "I refuse to install clock, it was changed on its way"),
+        ("unsigned or signed by a wrong key", "I refuse to install clock, it is not signed by my store"),
+        ("rollback", "I refuse to install clock, it is older than what I had"),
+        ("of a kind nobody knows", "I cannot install clock"),
+    ],
+)
+def test_a_package_that_is_refused_is_named_with_the_reason(home: Home, reason: str, words: str) -> None:
+    error = Invalid("cannot trust the store")
+    error.reason = reason
+    home.link.errors["install"] = error
+    home.start()
+    ask(home)
+    assert failing_round(home) == (["s3", "s4", "s6", "s11", "s3"], [words])
+
+
+@pytest.mark.parametrize("error", [Invalid("cannot read the answer"), Bug("cannot call: HTTP 500"), Refused("cannot interpret")])
+def test_a_platform_that_answers_wrongly_is_not_called_away(home: Home, error: Invalid | Bug | Refused) -> None:
+    home.link.errors["interpret"] = error
+    home.start()
+    ask(home, "please tell me how late it is", seconds=2.5, probability=0.1)
+    assert failing_round(home) == (["s3", "s5", "s11", "s3"], ["The platform does not answer as it should"])
+
+
 def test_when_the_new_version_cannot_be_downloaded_the_old_one_runs(home: Home) -> None:
     install_rapp(home.config.home, "clock", keywords=("what time is it",))
     home.link.catalogue[0]["version"] = "2.0.0"

@@ -18,8 +18,9 @@ from rapp_hop.client import HopClient
 from rapp_hop.errors import Refused, Unreachable
 from rapp_hop.hz.install import Installed, PackageFile, RappFolder, install
 from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.semver import parse_version
 from rapp_hop.hz.tar import Limits
-from rapp_hop.hz.trust import Release, TrustedStore, newest
+from rapp_hop.hz.trust import Attack, Release, TrustedStore, Untrusted, newest
 from rapp_hop.streaming import Progress, Writer
 
 OnPhase = Callable[[str, dict[str, Any]], None]  # "downloading" | "verified" | "installed", and details
@@ -95,6 +96,8 @@ class Delivery:
             present = self.folder.find(name, release.version.text)
             if present is not None and self.folder.find(name) == present:
                 return present
+            if version is None:
+                self._check_not_older(release)
             aside = self._new_file()
             try:
                 return self._fetch(store, release, aside, tell)
@@ -102,6 +105,13 @@ class Delivery:
                 aside.unlink(missing_ok=True)
         except OSError as error:
             raise Refused(f"cannot install {name}: {error.strerror}, check the disk") from None
+
+    def _check_not_older(self, release: Release) -> None:
+        """Refuse to go back behind what is installed: a version that was mended must not come back by itself."""
+        there = self.folder.find(release.name)
+        if there is not None and release.version.key < parse_version(there.version).key:
+            older = f"cannot install {release.name} {release.version.text}: {there.version} is installed"
+            raise Untrusted(Attack.ROLLBACK, f"{older}; remove it first if the older one is wanted")
 
     def _fetch(self, store: TrustedStore, release: Release, aside: Path, tell: _Tell) -> Installed:
         name, version = release.name, release.version.text

@@ -49,11 +49,12 @@ class Attack(StrEnum):
 
 
 class Untrusted(Invalid):
-    """The store, or who pretends to be it, cannot be believed; `attack` says what it looks like."""
+    """The store, or who pretends to be it, cannot be believed; `attack` says what it looks like, and is the `reason`."""
 
     def __init__(self, attack: Attack, message: str) -> None:
         super().__init__(message)
         self.attack = attack
+        self.reason = attack.value
 
 
 class Transport(Protocol):

@@ -2,9 +2,10 @@
 
 
 class CoreError(Exception):
-    """Root of the core agent's errors."""
+    """Root of the core agent's errors; `reason` is the link's word for what exactly was wrong, where it has one."""
 
     kind = "bug"
+    reason = ""
 
 
 class Refused(CoreError):  # noqa: N818 - the four names are the project's words for error kinds

@@ -13,6 +13,7 @@ from rapp_core.config import Config
 from rapp_core.control.listening import Listener
 from rapp_core.control.platform import Platform
 from rapp_core.control.question import which
+from rapp_core.control.refusals import not_installed, not_interpreted
 from rapp_core.errors import CoreError, Refused, Unreachable
 from rapp_core.launcher.lease import Lease
 from rapp_core.ports import Agent, Agents, Hop, Robot
@@ -106,7 +107,7 @@ class Control:
         try:
             answer = parts.hop.request("interpret", arguments, parts.config.interpret_timeout)
         except CoreError as error:
-            self._problem(share, "I cannot reach the platform", error)
+            self._problem(share, not_interpreted(error), error)
             return
         if answer.get("text"):
             parts.trace.heard(str(answer["text"]))
@@ -140,11 +141,11 @@ class Control:
         except Unreachable as error:
             known = parts.platform.rapps().get(name)
             if known is None or known.path is None:
-                self._problem(share, "I cannot reach the platform", error)
+                self._problem(share, not_installed(name, error), error)
             else:
                 share.memory["package"] = known.path
         except CoreError as error:
-            self._problem(share, f"I cannot install {name.replace('_', ' ')}", error)
+            self._problem(share, not_installed(name, error), error)
 
     def _progress(self, phase: str, _fraction: float) -> None:
         self._parts.trace.message(f"repository->core {phase}")

@@ -1,5 +1,6 @@
 """The port Hop on ROS: services rapp_hop/*, answered by the link over rosbridge (deliverable Fig. 10)."""
 
+import contextlib
 import json
 import queue
 import threading
@@ -13,7 +14,7 @@ from rapp_msgs.msg import HopEvent
 from rapp_msgs.srv import HopRequest
 from std_msgs.msg import String
 
-from rapp_core.errors import KINDS, Bug, Refused, Unreachable
+from rapp_core.errors import KINDS, Bug, CoreError, Refused, Unreachable
 from rapp_core.ports import Progress
 
 SILENCE = 0.9  # s without a sign of life of the link after which it is gone
@@ -101,7 +102,7 @@ class RosHop:
                 if progress is not None:
                     progress(event.phase, event.fraction)
             elif event.kind == HopEvent.FAILED:
-                raise KINDS.get(event.error, Bug)(event.message)
+                raise _error(event)
             else:
                 return _result(name, event.result)
 
@@ -113,6 +114,13 @@ class RosHop:
 
     def _sign_of_life(self, _message: Any) -> None:
         self._alive = time.monotonic()
+
+
+def _error(event: Any) -> CoreError:
+    error = KINDS.get(event.error, Bug)(event.message)
+    with contextlib.suppress(ValueError, TypeError, KeyError):
+        error.reason = str(json.loads(event.result)["reason"])
+    return error
 
 
 def _result(name: str, text: str) -> Any:

@@ -1,0 +1,30 @@
+"""Why something was not installed, or not interpreted, in words for the person. Pure."""
+
+from rapp_core.errors import CoreError, Unreachable
+
+AWAY = "I cannot reach the platform"
+ODD = "The platform does not answer as it should"
+
+_ATTACKS = {  # the link's reasons are TUF's names of attacks (rapp_hop.hz.trust)
+    "unsigned or signed by a wrong key": "it is not signed by my store",
+    "wrong hash or length": "it was changed on its way",
+    "rollback": "it is older than what I had",
+    "freeze": "the store shows me an old state",
+    "mix-and-match": "the store's lists do not fit each other",
+    "endless data": "it is longer than it should be",
+    "malformed metadata": "the store's lists are broken",
+}
+
+
+def not_installed(name: str, error: CoreError) -> str:
+    """What to say of a RApp that was not installed."""
+    spoken = name.replace("_", " ")
+    if isinstance(error, Unreachable):
+        return AWAY
+    why = _ATTACKS.get(error.reason)
+    return f"I refuse to install {spoken}, {why}" if why else f"I cannot install {spoken}"
+
+
+def not_interpreted(error: CoreError) -> str:
+    """What to say of a long command that was not interpreted."""
+    return AWAY if isinstance(error, Unreachable) else ODD
