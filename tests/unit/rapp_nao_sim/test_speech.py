@@ -3,7 +3,7 @@
 import numpy
 import pytest
 
-from rapp_nao_sim.sound.synthesis import VoiceError, speak
+from rapp_nao_sim.sound.synthesis import VoiceError, named, speak
 from rapp_nao_sim.speech import pronunciation
 from rapp_nao_sim.speech.pronunciation import pronounce, to_arpabet
 from rapp_nao_sim.speech.recogniser import noise_floor, probability
@@ -89,3 +89,10 @@ def test_the_noise_floor_is_the_level_of_the_quietest_tenth():
     sound = numpy.concatenate([random.normal(0, level, 3200) for level in (50, 2000, 2000, 2000)]).astype(numpy.int16)
     assert noise_floor(sound) == pytest.approx(50, rel=0.1)
     assert noise_floor(numpy.zeros(0, numpy.int16)) == 1.0
+
+
+def test_a_language_without_its_region_has_one_voice():
+    codes = named({"fr-be": "French (Belgium)", "fr-fr": "French (France)", "pl": "Polish", "es-419": "Spanish (Latin America)"})
+    assert (codes["French"], codes["French (Belgium)"], codes["Polish"], codes["Spanish"]) == ("fr-fr", "fr-be", "pl", "es-419")
+    assert named({"pt-br": "Portuguese (Brazil)", "pt": "Portuguese (Portugal)"})["Portuguese"] == "pt"
+    assert named({"grc": "Greek (Ancient)", "el": "Greek"})["Greek"] == "el"

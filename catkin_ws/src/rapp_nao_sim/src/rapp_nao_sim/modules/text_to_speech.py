@@ -38,7 +38,7 @@ class ALTextToSpeech(Module):
 
     def getAvailableLanguages(self) -> list[str]:  # noqa: N802
         """English names of all languages that can be spoken."""
-        return sorted(set(languages().values()) | {"English"})
+        return sorted(languages())
 
     def getSupportedLanguages(self) -> list[str]:  # noqa: N802
         """As getAvailableLanguages."""
@@ -72,7 +72,6 @@ class ALTextToSpeech(Module):
     def __voice_of(self, language: str) -> str:
         if language == "English":
             return self.__english
-        codes = [code for code, name in languages().items() if name == language]
-        if not codes:
+        if language not in languages():
             raise NaoqiError(f"language {language} is not installed")
-        return codes[0]
+        return languages()[language]

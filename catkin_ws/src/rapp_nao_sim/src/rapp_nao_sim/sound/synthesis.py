@@ -2,6 +2,7 @@
 
 import io
 import subprocess
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -42,6 +43,22 @@ def espeak(*words: str) -> bytes:
 
 @cache
 def languages() -> dict[str, str]:
-    """Language code to English name of all that espeak-ng speaks, such as "pl" to "Polish". Raises VoiceError."""
+    """English name to code of all languages that espeak-ng speaks, such as "Polish" to "pl". Raises VoiceError.
+
+    Of "French (Belgium)" and "French (France)" one is "French" too, as NAOqi names it.
+    """
     rows = [line.split() for line in espeak("--voices").decode().splitlines()[1:]]
-    return {row[1]: row[3].replace("_", " ") for row in rows if len(row) > 3}
+    return named({row[1]: row[3].replace("_", " ") for row in rows if len(row) > 3})
+
+
+def named(names: Mapping[str, str]) -> dict[str, str]:
+    """Name to code of languages given by code; a name without its region means "xx", else "xx-xx", else the first."""
+    codes = {name: code for code, name in names.items()}
+    for code in sorted(names, key=_specialty):
+        codes.setdefault(names[code].partition(" (")[0], code)
+    return codes
+
+
+def _specialty(code: str) -> int:
+    language, _, region = code.partition("-")
+    return 0 if not region else 1 if region == language else 2

@@ -14,6 +14,7 @@ from rapp_nao_sim.sound.samples import Samples
 from rapp_nao_sim.sound.synthesis import speak
 
 MOST = 50  # texts that wait
+LEAVING = 0.5  # s for the thread to end; a synthesis under way is not waited for
 
 _log = logging.getLogger(__name__)
 
@@ -71,7 +72,7 @@ class Mouth:
             self._ended = True
             self._changed.notify()
         self.stop()
-        self._thread.join(2)
+        self._thread.join(LEAVING)
 
     def say(self, saying: Saying) -> "Future[bool]":
         """Say a text after those that wait; gives its `done`. Raises MouthError."""

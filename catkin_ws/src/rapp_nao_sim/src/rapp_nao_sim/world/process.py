@@ -54,8 +54,8 @@ class WorldClient:
 
     def close(self) -> None:
         """End the processes and wait for them."""
+        self._physics.close()  # first: a picture that fails by the renderer's end is not tried again then
         self._renderer.close()
-        self._physics.close()
 
     def __enter__(self) -> "WorldClient":
         self.start()
@@ -161,6 +161,8 @@ class WorldClient:
             try:
                 png = self._draw(state)
             except Unreachable:
+                if not self.alive():
+                    raise
                 self._renderer.close()
                 png = self._draw(state)  # by a new process, once
         _write(Path(path), png)

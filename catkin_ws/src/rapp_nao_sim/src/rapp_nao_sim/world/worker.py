@@ -20,7 +20,7 @@ from typing import Any
 
 from rapp_nao_sim.world.errors import Bug, Refused, Unreachable, WorldError
 
-STOP_TIMEOUT = 1.0  # s, for a child to end by itself
+STOP_TIMEOUT = 0.3  # s, for a child to end by itself; it has nothing to tidy up, and three are to end within 2 s
 SEND_TIMEOUT = 5  # s, for a child to take a request from the line
 CALL_TIMEOUT = 5.0  # s, for an answer that needs no movement
 
