@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rapp_cli import bench, test
 from rapp_cli.demo import command as demo
-from rapp_cli.home import down, say, up
+from rapp_cli.home import down, listen, log, say, status, up
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,9 @@ COMMANDS = (
     Command("demo", "run voice-mail end to end: a person speaks, a mail arrives", demo.add_options, demo.run),
     Command("up", "start a robot and a cloud that keep running", up.add_options, up.run),
     Command("say", "speak to the simulated robot, and see what it does", say.add_options, say.run),
+    Command("listen", "speak to it by this computer's microphone", listen.add_options, listen.run),
+    Command("status", "show every agent, its state and since when", status.add_options, status.run),
+    Command("log", "show what the agents write, and follow it", log.add_options, log.run),
     Command("down", "end them", down.add_options, down.run),
     Command("test", "check and test everything, as continuous integration does", test.add_options, test.run),
     Command("bench", "measure: " + ", ".join(bench.SUBJECTS), bench.add_options, bench.run),

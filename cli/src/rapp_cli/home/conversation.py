@@ -2,7 +2,7 @@
 
 import asyncio
 import sys
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 
 from tornado.websocket import WebSocketError
@@ -38,7 +38,7 @@ def room_of(home: Home) -> None:
         raise CommandError(f"cannot speak to the robot: it is not up; start it with {home.command('up')}")
 
 
-async def converse(home: Home, utterances: Iterator[Utterance], voice: str, timeout: float, *, endless: bool = False) -> int:
+async def converse(home: Home, utterances: AsyncIterator[Utterance], voice: str, timeout: float, *, endless: bool = False) -> int:
     """Say all of them, each one when the robot listens; gives 0 once it listens again, 1 when it does not react to a command.
 
     With `endless`, go on while a RApp asks for answers. Raises CommandError.
@@ -88,10 +88,10 @@ class _Talk:
         self._timeline = timeline
         self._seen = 0  # entries of the timeline
 
-    async def go_on(self, utterances: Iterator[Utterance], *, endless: bool) -> int:
+    async def go_on(self, utterances: AsyncIterator[Utterance], *, endless: bool) -> int:
         """See `converse`."""
         asked = await self._until_it_may_hear()
-        for utterance in utterances:
+        async for utterance in utterances:
             self._seen = len(self._timeline.entries)
             await self._say(utterance)
             if not asked and not await self._reacts():

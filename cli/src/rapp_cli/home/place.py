@@ -97,8 +97,8 @@ class Home:
         """Make the folders, for this user only. Raises UsageError for a place that cannot be a home, CommandError."""
         if len(bytes(self.socket)) > LONGEST_SOCKET:
             raise UsageError(f"cannot use {self.folder} as a home: its path is too long for a socket; give a shorter --home")
-        if any(mark in str(self.folder) for mark in ";#\n\r'\""):
-            raise UsageError(f"cannot use {self.folder} as a home: give a --home without quotes, ; and #")
+        if any(mark in str(self.folder) for mark in ";#%\n\r'\""):
+            raise UsageError(f"cannot use {self.folder} as a home: give a --home without quotes, ;, # and %")
         try:
             for folder in (self.folder, self.robot, self.cloud, self.logs, self.supervision):
                 folder.mkdir(parents=True, exist_ok=True, mode=0o700)

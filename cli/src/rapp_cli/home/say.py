@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import functools
+from collections.abc import AsyncIterator, Sequence
 
 from rapp_cli.home.conversation import Utterance, converse, room_of
 from rapp_cli.home.place import add_home_option, home_of
@@ -22,5 +23,9 @@ def run(options: argparse.Namespace) -> int:
     """Say all texts; 0 when the robot listens again, 1 when it did not react."""
     home = home_of(options)
     room_of(home)
-    texts = [Utterance(text, functools.partial(Person.say, text=text)) for text in options.text]
-    return asyncio.run(converse(home, iter(texts), options.voice, options.timeout))
+    return asyncio.run(converse(home, _texts(options.text), options.voice, options.timeout))
+
+
+async def _texts(texts: Sequence[str]) -> AsyncIterator[Utterance]:
+    for text in texts:
+        yield Utterance(text, functools.partial(Person.say, text=text))

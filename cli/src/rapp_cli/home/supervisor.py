@@ -122,10 +122,11 @@ class Supervisor:
     def processes(self) -> dict[str, Process]:
         """All agents, in the order of their start; none when the supervisor is away. Raises CommandError."""
         try:
+            order = {item["name"]: item["process_prio"] for item in self._call("getAllConfigInfo")}
             found = self._call("getAllProcessInfo")
-        except _AwayError:
+        except (_AwayError, xmlrpc.client.Fault):
             return {}
-        return {item["name"]: _process(item) for item in found}
+        return {item["name"]: _process(item) for item in sorted(found, key=lambda item: order[item["name"]])}
 
     def stop(self, agent: str) -> None:
         """End one agent; returns when it is reaped. Raises CommandError."""

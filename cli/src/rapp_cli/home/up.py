@@ -103,7 +103,7 @@ def _offer(home: Home, folder: Path) -> None:
     try:
         open_shelf(home.cloud).publish(build(folder))
     except (HopError, OSError) as error:
-        print(f"rapp up: {folder.name} is not offered: {error}", flush=True)
+        print(f"rapp up: the store keeps what it has of {folder.name}: {error}", flush=True)
 
 
 async def _started(
@@ -136,7 +136,8 @@ class _Watch:
                     await asyncio.sleep(STEP)
         except TimeoutError:
             name = next(iter(self._waiting), CORE)
-            raise CommandError(f"cannot get {name} ready within {timeout:g} s\n{tail(self._home.log(name))}") from None
+            what = f"get {name} ready" if self._waiting else "get the robot to listen"
+            raise CommandError(f"cannot {what} within {timeout:g} s\n{tail(self._home.log(name))}") from None
         finally:
             listening.cancel()
         self._print("robot", "listens")
@@ -183,12 +184,16 @@ def tail(log: Path, lines: int = 15) -> str:
 
 
 def _tell_what_next(home: Home, settings: Settings) -> None:
-    say = "say “e-mail” to it" if settings.robot else f"{home.command('say e-mail'):<24} speaks to it"
-    print(f"\n  {say}")
-    for command, what in (("status", "what runs"), ("log", "what the agents write"), ("down", "ends it")):
-        print(f"  {home.command(command):<24} {what}")
+    commands = {"status": "shows what runs", "log": "shows what the agents write", "down": "ends it"}
+    if settings.robot is None:
+        commands = {"say e-mail": "speaks to it", "listen": "speaks to it by your microphone", **commands}
+    else:
+        print("rapp up: say “e-mail” to it")
+    width = max(len(home.command(words)) for words in commands)
+    for words, what in commands.items():
+        print(f"  {home.command(words):<{width}}  {what}")
     if settings.cloud is None:
-        print(f"  whom it may write to is in {_profile(home, settings)}")
+        print(f"rapp up: whom it may write to is in {_profile(home, settings)}")
 
 
 def _profile(home: Home, settings: Settings) -> Path:

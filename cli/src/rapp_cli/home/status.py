@@ -1,0 +1,152 @@
+"""`./rapp status`: every agent, its state and since when; the core agent's FSM; the running RApp; the platform; waiting mails."""
+
+import argparse
+import asyncio
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from tornado.websocket import WebSocketError, websocket_connect
+
+from rapp_cli.home.agents import CORE, RECORDER
+from rapp_cli.home.place import Home, add_home_option, home_of
+from rapp_cli.home.supervisor import Process, Supervisor, process_state
+from rapp_cli.timeline import Entry, latest
+from rapp_hop.errors import Invalid
+from rapp_link.letter import from_json
+
+ALL_RUN, SOMETHING_DOES_NOT, NOTHING_IS_UP = 0, 1, 3
+PATIENCE = 1.5  # s for the link's sign of life
+RUNS_A_RAPP = ("s7", "s8", "s9", "s10")  # states of the core FSM
+ALIVE = {"op": "subscribe", "topic": "/rapp_hop/alive", "type": "std_msgs/String"}
+
+
+@dataclass(frozen=True)
+class State:
+    """Where the core FSM is."""
+
+    state: str
+    name: str
+    since: float  # s since 1970
+
+
+@dataclass(frozen=True)
+class Status:
+    """All that the command tells."""
+
+    agents: Sequence[Process]
+    core: State | None  # None: not known
+    rapp: str | None  # name of the RApp that runs
+    registered: bool | None  # with the platform; None: not known, as the link or the rosbridge does not answer
+    mails_waiting: int
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of `./rapp status`."""
+    parser.description = "Shows what runs. Exit status: 0 all agents run, 1 one of them does not, 3 nothing is up."
+    parser.add_argument("--json", action="store_true", help="for programs; times are seconds since 1970")
+    add_home_option(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the status; gives the exit status."""
+    home = home_of(options)
+    processes = Supervisor(home).processes()
+    status = read(home, processes)
+    print(json.dumps(asdict(status), indent=2) if options.json else text(home, status, time.time()))
+    if not processes:
+        return NOTHING_IS_UP
+    return ALL_RUN if all(process.state == "RUNNING" for process in status.agents) else SOMETHING_DOES_NOT
+
+
+def read(home: Home, processes: Mapping[str, Process]) -> Status:
+    """Put together what supervisor, recorder, link and the robot's folders tell."""
+    agents = [_frozen(process) for process in processes.values()]
+    core = _core(latest(home.timeline), processes)
+    running = core is not None and core.state in RUNS_A_RAPP
+    registered = asyncio.run(_registered(home.settled().bridge)) if processes else None
+    return Status(agents, core, _rapp(home.robot / "runs") if running else None, registered, _waiting(home.robot))
+
+
+def _frozen(process: Process) -> Process:
+    """A process that was stopped by a signal looks alive to its supervisor."""
+    if process.pid is None or process_state(process.pid) != "T":
+        return process
+    return Process(process.name, "FROZEN", process.since, process.pid, "stopped by a signal; see kill -CONT")
+
+
+def _core(entries: Sequence[Entry], processes: Mapping[str, Process]) -> State | None:
+    """The state entered last, unless the recorder or the core agent is not there, or has not been for long enough."""
+    if not all(name in processes and processes[name].runs for name in (CORE, RECORDER)):
+        return None
+    for entry in reversed(entries):
+        if entry.agent == "core" and entry.kind == "entered" and "/" not in entry.state:
+            return State(entry.state, entry.detail, entry.time) if entry.time >= processes[CORE].since else None
+    return None
+
+
+def _rapp(runs: Path) -> str | None:
+    """The name in the package of the run that has one: a spare has none yet."""
+    for manifest in sorted(runs.glob("*/package/package.json")):
+        try:
+            return str(json.loads(manifest.read_text())["name"])
+        except (OSError, ValueError, KeyError, TypeError):
+            continue  # it ended meanwhile
+    return None
+
+
+async def _registered(bridge: str) -> bool | None:
+    try:
+        async with asyncio.timeout(PATIENCE):
+            socket = await websocket_connect(bridge, connect_timeout=PATIENCE)
+            try:
+                await socket.write_message(json.dumps(ALIVE))
+                message: dict[str, Any] = json.loads(await socket.read_message() or "{}")
+                return bool(json.loads(message["msg"]["data"])["cloud"])
+            finally:
+                socket.close()
+    except (OSError, WebSocketError, TimeoutError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _waiting(robot: Path) -> int:
+    count = 0
+    for path in (robot / "link" / "outbox").glob("*/letter.json"):
+        try:
+            count += from_json(path.read_bytes()).state == "queued"
+        except (OSError, Invalid):
+            continue  # it was sent meanwhile, or the link itself complains of it
+    return count
+
+
+def text(home: Home, status: Status, now: float) -> str:
+    """The status for people."""
+    lines = [
+        f"{process.name:<11} {process.state.lower():<9} since {_when(process.since, now):<28} "
+        + (f"process {process.pid}" if process.pid else process.problem)
+        for process in status.agents
+    ] or [f"nothing is up; start it with {home.command('up')}"]
+    if status.agents:
+        core = status.core
+        lines += ["", f"core agent  {f'{core.state} {core.name}, since {_when(core.since, now)}' if core else 'state not known'}"]
+        lines += [f"RApp        {status.rapp or 'none runs'}"]
+        platform = {True: "registered", False: "not registered: it is away", None: "not known: the link does not answer"}
+        lines += [f"platform    {platform[status.registered]}"]
+    return "\n".join([*lines, f"mails       {status.mails_waiting} waiting to be sent"])
+
+
+def _when(moment: float, now: float) -> str:
+    if not moment:
+        return "never"
+    format_ = "%H:%M:%S" if now - moment < 12 * 3600 else "%Y-%m-%d %H:%M:%S"
+    return f"{time.strftime(format_, time.localtime(moment))} ({_span(max(0.0, now - moment))})"
+
+
+def _span(seconds: float) -> str:
+    for size, unit in ((86400, "d"), (3600, "h"), (60, "min")):
+        if seconds >= size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"
