@@ -20,9 +20,7 @@ def test_ready_line_is_read_and_sigterm_ends_the_child(tmp_path: Path) -> None:
     async def story() -> dict[str, int]:
         async with Children() as children:
             return await children.start(
-                child(
-                    tmp_path, "print('READY {\"port\": 7}', flush=True); input() if 0 else __import__('time').sleep(60)"
-                )
+                child(tmp_path, "print('READY {\"port\": 7}', flush=True); input() if 0 else __import__('time').sleep(60)")
             )
 
     assert asyncio.run(story()) == {"port": 7}

@@ -1,0 +1,103 @@
+"""What `status` puts together."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rapp_cli.home import status
+from rapp_cli.home.place import Home, Settings
+from rapp_cli.home.status import State, Status
+from rapp_cli.home.supervisor import Process
+from rapp_cli.timeline import Entry, append
+from rapp_link.letter import Letter, to_json
+
+NOW = 1_800_000_000.0
+
+
+def process(name: str, **other: Any) -> Process:
+    fields = {"name": name, "state": "RUNNING", "since": NOW - 60, "pid": None, "problem": ""}
+    return Process(**{**fields, **other})
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Home:
+    home = Home(tmp_path)
+    home.make()
+    return home
+
+
+@pytest.fixture
+def silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def nobody(_bridge: str) -> None:
+        return None
+
+    monkeypatch.setattr(status, "_registered", nobody)
+
+
+BOTH = {name: process(name) for name in ("recorder", "core_agent")}
+
+
+def core(entries: list[Entry], processes: dict[str, Process] | None = None) -> State | None:
+    return status._core(entries, BOTH if processes is None else processes)
+
+
+def test_the_core_agent_is_in_the_state_it_entered_last() -> None:
+    entries = [
+        Entry("core", "core", "s3", "entered", "listen", NOW - 9),
+        Entry("core", "core", "s9", "entered", "await and execute commands", NOW - 8),
+        Entry("core", "rapp_say", "s9/say", "entered", "delegate to e_ls", NOW - 7),
+        Entry("dynamic", "dynamic", "s31", "entered", "say", NOW - 6),
+        Entry("core", "core", "s9", "said", "hello", NOW - 5),
+    ]
+    assert core(entries) == State("s9", "await and execute commands", NOW - 8)
+
+
+def test_the_state_of_an_earlier_core_agent_is_not_that_of_the_present_one() -> None:
+    assert core([Entry("core", "core", "s3", "entered", "listen", NOW - 61)]) is None
+
+
+@pytest.mark.parametrize("away", ["recorder", "core_agent"])
+def test_without_recorder_or_core_agent_the_state_is_not_known(away: str) -> None:
+    entries = [Entry("core", "core", "s3", "entered", "listen", NOW - 9)]
+    assert core(entries) is not None
+    assert core(entries, {**BOTH, away: process(away, state="BACKOFF")}) is None
+    assert core(entries, {}) is None
+
+
+def test_waiting_mails_are_counted_and_finished_ones_are_not(home: Home) -> None:
+    outbox = home.robot / "link" / "outbox"
+    for name, pending in (("a", ("x@y",)), ("b", ()), ("c", ("x@y",))):
+        (outbox / name).mkdir(parents=True)
+        (outbox / name / "letter.json").write_bytes(to_json(Letter(f"<{name}>", "me@y", ("x@y",), "", NOW, pending)))
+    (outbox / "broken").mkdir()
+    (outbox / "broken" / "letter.json").write_text("{")
+    assert status.read(home, {}).mails_waiting == 2
+
+
+@pytest.mark.usefixtures("silent")
+def test_the_running_rapp_is_the_one_whose_package_is_in_a_run(home: Home) -> None:
+    home.keep(Settings("nao", None, None, None, (), {"rosbridge": 1}))
+    for run in ("spare", "busy"):
+        (home.robot / "runs" / run / "package").mkdir(parents=True)
+    (home.robot / "runs" / "busy" / "package" / "package.json").write_text(json.dumps({"name": "voice_mail"}))
+    append(home.timeline, Entry("core", "core", "s9", "entered", "await and execute commands", NOW))
+    assert status.read(home, BOTH).rapp == "voice_mail"
+    append(home.timeline, Entry("core", "core", "s3", "entered", "listen", NOW))
+    assert status.read(home, BOTH).rapp is None
+
+
+def test_people_are_told_what_runs_since_when_and_why_not(home: Home) -> None:
+    agents = [process("roscore", pid=7), process("link", state="BACKOFF", since=NOW - 7200, problem="it ended with status 1")]
+    lines = status.text(home, Status(agents, State("s3", "listen", NOW - 5), None, None, 3), NOW).splitlines()
+    assert "running" in lines[0]
+    assert "(1 min)" in lines[0]
+    assert "process 7" in lines[0]
+    assert "backoff" in lines[1]
+    assert "(2 h)" in lines[1]
+    assert "it ended with status 1" in lines[1]
+    rest = "\n".join(lines[2:])
+    for words in ("s3 listen", "(5 s)", "none runs", "the link does not answer", "3 waiting"):
+        assert words in rest
+    assert "./rapp up" in status.text(home, Status([], None, None, None, 0), NOW)
