@@ -23,6 +23,7 @@ class Script:
     crash: float | None = None
     silent: float | None = None  # from then on no heartbeat
     stuck: float | None = None  # from then on its own loop stands still
+    waits: bool = True  # for a core service, as far as it says
     answers_dismantle: bool = True
     acts: list[tuple[float, Callable[["FakeAgent"], None]]] = field(default_factory=list)
 
@@ -37,6 +38,7 @@ class FakeAgent:
         self.alive = True
         self.first_word = TimedEvent(clock)
         self.outcome: tuple[str, str] | None = None
+        self.waits = script.waits
         self.heartbeat = self.progress = clock.now()
         self._clock, self._script, self._journal, self._told, self._start = clock, script, journal, told, clock.now()
         self._plan()

@@ -65,7 +65,7 @@ class WholeRobot:
         self.folder, self.home, self.data = folder, folder / "robot", folder / "cloud"
         self.maildir = folder / "mail"
         self.logs = folder / "logs"
-        self.settings: dict[str, float] = {}  # of the core agent, beside its defaults
+        self.settings = ""  # of the core agent, in TOML, beside its defaults
         self.cloud_port = free_port()
         self.cloud_url = f"http://127.0.0.1:{self.cloud_port}"  # as the link reaches the platform
         self.mail_port = free_port()
@@ -116,7 +116,7 @@ class WholeRobot:
 
     def _config(self) -> Path:
         path = self.folder / "core_agent.toml"
-        path.write_text("".join(f"{name} = {value}\n" for name, value in self.settings.items()))
+        path.write_text(self.settings)
         return path
 
     def _environment(self) -> dict[str, str]:
@@ -226,6 +226,17 @@ class WholeRobot:
         """Wait until the core agent has entered s3."""
         return self.until(entered("s3"), since, seconds)
 
+    def until_only_the_spare_runs(self) -> None:
+        """Wait until nothing of any run is left but the warm spare."""
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            runs = list((self.home / "runs").iterdir())
+            sandboxes = {words for words in processes_of(self.home / "runs") if words.startswith("bwrap")}
+            if len(runs) <= 1 and len(sandboxes) <= 1:
+                return
+            assert time.monotonic() < deadline, f"left running: {runs} {sandboxes}"
+            time.sleep(0.1)
+
     def said(self, since: int = 0) -> list[str]:
         """What the robot has said."""
         return [seen.detail for seen in self.seen[since:] if seen.kind == "said"]
@@ -265,6 +276,11 @@ TEXT_FED = ("--microphone", "text", "--voice", "silent", "--no-world")
 def entered(state: str, agent: str = "core") -> Callable[[Seen], bool]:
     """Matches the entering of a state."""
     return lambda seen: (seen.agent, seen.state, seen.kind) == (agent, state, "entered")
+
+
+def listening_after(moment: Seen) -> Callable[[Seen], bool]:
+    """Matches the entering of s3 after a moment."""
+    return lambda seen: entered("s3")(seen) and seen.time > moment.time
 
 
 def processes_of(folder: Path, but: Sequence[int] = ()) -> list[str]:

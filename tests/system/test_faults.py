@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from fakes.rapps import write_rapp
-from fakes.whole_robot import PATIENCE, Seen, WholeRobot, entered, processes_of, whole_robot
+from fakes.whole_robot import PATIENCE, Seen, WholeRobot, entered, listening_after, whole_robot
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(900)]
 
@@ -133,7 +133,7 @@ def suffer(robot: WholeRobot, state: str, name: str, how: str) -> Cell:
     robot.thaw_all()
     served = serve(robot)
     listened = next(seen for seen in reversed(robot.seen) if seen.time < served.time and entered("s3")(seen))
-    left_running(robot)
+    robot.until_only_the_spare_runs()
     return Cell(max(0.0, listened.time - back), served.time - back)
 
 
@@ -145,21 +145,9 @@ def serve(robot: WholeRobot) -> Seen:
         robot.ask("fine")
         with suppress(AssertionError):
             spoken = robot.until(lambda seen: seen.kind == "said" and seen.detail == "fine", since, 5.0)
-            robot.until(lambda seen: entered("s3")(seen) and seen.time > spoken.time, since)
+            robot.until(listening_after(spoken), since)
             return spoken
         assert time.monotonic() < deadline, f"it is not served again\n{robot.story(since)}"
-
-
-def left_running(robot: WholeRobot) -> None:
-    """Nothing of a run is left but the warm spare."""
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        runs = list((robot.home / "runs").iterdir())
-        sandboxes = {words for words in processes_of(robot.home / "runs") if words.startswith("bwrap")}
-        if len(runs) <= 1 and len(sandboxes) <= 1:
-            return
-        assert time.monotonic() < deadline, f"left running: {runs} {sandboxes}"
-        time.sleep(0.1)
 
 
 def column(folder: Path, packages: list[Path], fault: tuple[str, str]) -> Table:

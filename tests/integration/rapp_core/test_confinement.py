@@ -93,7 +93,8 @@ facts = {"fds": kinds, "env": sorted(os.environ), "channel": os.environ["RAPP_CH
     assert set(files) == {"0", "1", "2"}, files
     assert facts["fds"][facts["channel"]].startswith("socket:")
     assert set(facts["env"]) <= {
-        "HOME", "LANG", "PATH", "PWD", "PYTHONDONTWRITEBYTECODE", "RAPP_CHANNEL_FD", "ROS_HOME", "ROS_IP", "ROS_LOG_DIR",
+        "HOME", "LANG", "MALLOC_ARENA_MAX", "PATH", "PWD", "PYTHONDONTWRITEBYTECODE", "RAPP_CHANNEL_FD",
+        "ROS_HOME", "ROS_IP", "ROS_LOG_DIR",
         "ROS_MASTER_URI", "TMPDIR", "LC_CTYPE", "ROS_LOG_FILENAME",
     }  # fmt: skip
 

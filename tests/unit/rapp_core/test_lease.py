@@ -97,3 +97,9 @@ def test_a_call_of_a_core_service_is_no_standstill(clock: Clock, lease: Lease, t
     assert lease.problem(serving=False) is None
     clock.advance(0.2)
     assert lease.problem(serving=False) == HANGS
+
+
+def test_calls_of_threads_beside_the_loop_do_not_hide_its_standstill(clock: Clock, lease: Lease, tmp_path: Path) -> None:
+    lease.grant(agent(clock, tmp_path, stuck=0.0, waits=False))
+    clock.advance(10.3)
+    assert lease.problem(serving=True) == HANGS

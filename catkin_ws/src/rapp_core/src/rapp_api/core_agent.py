@@ -1,7 +1,8 @@
 """The core agent as a RApp sees it (port), and which one this process talks to."""
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 from rapp_api.errors import Bug
@@ -36,13 +37,15 @@ class CoreAgent(Protocol):
 
 
 class Activity:
-    """Counts what the dynamic agent's own loop does; the heartbeat carries the count, so that a standstill is seen.
+    """What the dynamic agent's own loop does; the heartbeat carries it, so that a standstill is seen.
 
     Only the loop's own thread counts: a thread beside it must not hide that the loop hangs.
     """
 
     def __init__(self) -> None:
         self.count = 0
+        self.waits = False
+        """Whether the loop waits for a core service to answer."""
         self._loop: int | None = None
 
     def begin(self) -> None:
@@ -51,8 +54,22 @@ class Activity:
 
     def moved(self) -> None:
         """Count one step of the loop, or one call it has finished."""
-        if threading.get_ident() == self._loop:
+        if self._is_loop():
             self.count += 1
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Around a call of a core service."""
+        self.waits = self.waits or self._is_loop()
+        try:
+            yield
+        finally:
+            if self._is_loop():
+                self.waits = False
+            self.moved()
+
+    def _is_loop(self) -> bool:
+        return threading.get_ident() == self._loop
 
 
 activity = Activity()

@@ -42,7 +42,7 @@ def live(channel: Channel, order: dict[str, Any], lost: Callable[[], None], boun
 
     def beat() -> None:
         while not gone.is_set():
-            channel.send(type="heartbeat", count=activity.count)
+            channel.send(type="heartbeat", count=activity.count, waits=activity.waits)
             gone.wait(bounds.heartbeat)
 
     for work in (obey, beat):

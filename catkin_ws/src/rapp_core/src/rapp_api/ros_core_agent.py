@@ -74,9 +74,8 @@ class RosCoreAgent:
             activity.moved()
 
     def _call(self, name: str, srv: str, **fields: Any) -> Any:
-        with _translated(name):
+        with _translated(name), activity.waiting():
             response = self._answer(name, getattr(rapp_msgs.srv, srv), fields)
-        activity.moved()
         if not response.success:
             raise KINDS.get(getattr(response, "error", ""), Refused)(response.message)
         return response

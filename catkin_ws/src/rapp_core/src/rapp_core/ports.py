@@ -164,7 +164,11 @@ class Agent(Protocol):
         """When its last heartbeat came."""
 
     progress: float
-    """When its own loop last moved, or a core service ran for it."""
+    """When its own loop last moved, or waited for a core service that ran for it."""
+
+    @property
+    def waits(self) -> bool:
+        """Whether its own loop waits for a core service, as far as it says."""
 
     def dismantle(self, patience: float, hurry: Signal) -> bool:
         """Ask it to stop what it has started; gives whether it answered within `patience` s, or before `hurry`."""

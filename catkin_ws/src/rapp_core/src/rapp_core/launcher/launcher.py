@@ -113,6 +113,7 @@ class Launcher:
             "ROS_LOG_DIR": INSIDE_PRIVATE,
             "PATH": "/usr/bin:/bin",
             "LANG": "C.UTF-8",
+            "MALLOC_ARENA_MAX": "2",  # each arena takes 64 MB of the limit on address space, whether used or not
             "PYTHONDONTWRITEBYTECODE": "1",
         }
 

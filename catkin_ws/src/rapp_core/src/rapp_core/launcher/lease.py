@@ -64,7 +64,7 @@ class Lease:
             return CRASHED
         if now - run.heartbeat > self._config.heartbeat:
             return SILENT
-        if serving:
+        if serving and run.waits:
             run.progress = now
         elif now - run.progress > self._config.hang:
             return HANGS

@@ -33,6 +33,7 @@ class Run:
         self.outcome: tuple[str, str] | None = None  # "done" or "failed", and why, once it has sent "terminate"
         self.heartbeat = time.monotonic()  # when the last heartbeat came
         self.progress = time.monotonic()  # when its own loop last moved
+        self.waits = False  # whether its own loop waits for a core service
         self._count = -1
         self._process = process
         self._channel = channel
@@ -117,7 +118,7 @@ class Run:
     def _take(self, message: dict[str, Any]) -> None:
         kind = message["type"]
         if kind == "heartbeat":
-            self._beat(message.get("count"))
+            self._beat(message.get("count"), message.get("waits"))
         elif kind == "ready":
             self.ready.set()
         elif kind == "first_word":
@@ -129,8 +130,9 @@ class Run:
         if kind == "gone":
             self.gone.set()
 
-    def _beat(self, count: object) -> None:
+    def _beat(self, count: object, waits: object) -> None:
         self.heartbeat = time.monotonic()
+        self.waits = waits is True
         if isinstance(count, int) and count > self._count:
             self._count = count
             self.progress = self.heartbeat
