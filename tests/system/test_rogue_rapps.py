@@ -60,7 +60,9 @@ ROGUES = {
         "for number in range(10_000):\n    with open(f'file{number}', 'wb') as file: file.write(bytes(1_000_000))",
         "It has failed", 4.0,
     ),
-    "fills the memory": Rogue("kept = []\nwhile True:\n    kept.append(bytearray(50_000_000))\n    self.pause(0.01)", "It has failed", 4.0),
+    "fills the memory": Rogue(
+        "kept = []\nwhile True:\n    kept.append(bytearray(50_000_000))\n    self.pause(0.01)", "It has failed", 4.0,
+    ),
     "ignores its end": Rogue(
         "import signal, time, types\nfor number in (signal.SIGTERM, signal.SIGINT): signal.signal(number, signal.SIG_IGN)\n"
         "self.dismantle = lambda: time.sleep(1000)", "", 2.0 + 1.0 + 1.0,
