@@ -182,6 +182,20 @@ def test_an_installed_rapp_runs_without_link_and_without_delay(home: Home) -> No
     assert len(home.link.asked) == asked
 
 
+def test_a_rapp_that_comes_on_offer_is_listened_for_at_once(home: Home) -> None:
+    home.link.away = True
+    home.start()
+
+    def come_back() -> None:
+        home.link.away = False
+        home.platform.attempt()
+
+    home.clock.at(home.clock.time + 2.0, come_back)
+    home.fake.person_says_at(home.clock.time + 3.0, "what time is it")
+    assert home.round() == KEYWORD
+    assert home.clock.time < home.config.listening_round
+
+
 def test_one_run_after_another(home: Home) -> None:
     home.start()
     for _ in range(3):

@@ -51,6 +51,14 @@ def test_receptors_are_left_as_they_were_found(room: Room) -> None:
     assert room.fake.body.recording is None
 
 
+def test_new_keywords_end_a_round_but_no_utterance(room: Room) -> None:
+    room.fake.person_says_at(2.0, "e-mail")
+    stop = room.clock.event()
+    assert room._listener.round(["e-mail"], room.recording, stop, lambda: room.clock.time > 2.3) == "e-mail"
+    assert room._listener.round(["e-mail"], room.recording, stop, lambda: True) is None
+    assert room.clock.time < 3.0
+
+
 @pytest.mark.parametrize("seconds", [0.2, 0.6, 1.3])
 def test_a_short_sound_that_is_no_keyword_is_nothing(room: Room, seconds: float) -> None:
     room.fake.person_says_at(2.0, "hm", probability=0.39, seconds=seconds)

@@ -45,6 +45,16 @@ def test_once_registered_only_the_catalogue_is_read_again(platform: Platform, li
     assert set(platform.rapps()) == {"clock", "parrot"}
 
 
+def test_changes_of_the_catalogue_are_counted(platform: Platform, link: FakeLink) -> None:
+    counts = []
+    for _ in range(2):
+        platform.attempt()
+        counts.append(platform.changes)
+    link.catalogue[0]["version"] = "2.0.0"
+    platform.attempt()
+    assert [*counts, platform.changes] == [1, 1, 2]
+
+
 def test_while_the_platform_is_away_installed_rapps_are_known(platform: Platform, link: FakeLink, tmp_path: Path) -> None:
     link.away = True
     install_rapp(tmp_path, "clock", keywords=("what time is it",))

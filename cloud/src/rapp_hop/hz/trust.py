@@ -26,7 +26,7 @@ from tuf.ngclient.config import UpdaterConfig
 from tuf.ngclient.fetcher import FetcherInterface
 from tuf.ngclient.updater import Updater
 
-from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
+from rapp_hop.errors import Bug, HopError, Invalid, Refused, Unreachable
 from rapp_hop.hz.archive import package_file_name
 from rapp_hop.hz.semver import Version, parse_version
 from rapp_hop.hz.tar import Limits
@@ -190,7 +190,7 @@ class _Fetcher(FetcherInterface):
             on_progress = None if "/metadata/" in url else self._on_progress
             try:
                 self._transport.get(url, file.write, max_length, on_progress)
-            except Refused as error:
+            except (Refused, Bug) as error:
                 raise tuf.DownloadHTTPError(str(error), error.status or 403) from None
             except Invalid as error:
                 raise tuf.DownloadLengthMismatchError(str(error)) from None

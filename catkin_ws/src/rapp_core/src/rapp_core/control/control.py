@@ -81,10 +81,10 @@ class Control:
 
     def listen(self, share: Subsystem) -> None:
         """One listening round."""
-        parts = self._parts
+        parts, known = self._parts, self._parts.platform.changes
         share.memory.update(keyword=None, command=None, choice=None, problem=None, rapp=None, error=None)
         keywords = {keyword: known.name for known in parts.platform.rapps().values() for keyword in known.keywords}
-        heard = self._listener.round(sorted(keywords), self._recording, parts.stop)
+        heard = self._listener.round(sorted(keywords), self._recording, parts.stop, lambda: parts.platform.changes != known)
         if isinstance(heard, Path):
             share.memory["command"] = heard
         elif heard is not None:

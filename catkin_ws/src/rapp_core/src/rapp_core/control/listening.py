@@ -21,10 +21,12 @@ class Listener:
         self._now = now
         self._heard: deque[tuple[float, Word | Sound]] = deque(maxlen=256)
 
-    def round(self, keywords: Sequence[str], recording: Path, stop: threading.Event) -> str | Path | None:
+    def round(
+        self, keywords: Sequence[str], recording: Path, stop: threading.Event, stale: Callable[[], bool] = lambda: False
+    ) -> str | Path | None:
         """Listen once: a keyword (as spelt in `keywords`), the recording of a long command, or None when all was quiet.
 
-        Raises Unreachable when the robot is lost meanwhile.
+        The round is over, too, once the keywords are `stale` and nobody speaks. Raises Unreachable when the robot is lost.
         """
         self._heard.clear()
         ears, recorder = self._robot.ears, self._robot.recorder
@@ -34,13 +36,15 @@ class Listener:
         try:
             ears.subscribe(lambda item: self._heard.append((self._now(), item)))
             try:
-                return self._poll(frozenset(keywords), recording, stop)
+                return self._poll(frozenset(keywords), recording, stop, stale)
             finally:
                 ears.unsubscribe()
         finally:
             recorder.stop()
 
-    def _poll(self, keywords: frozenset[str], recording: Path, stop: threading.Event) -> str | Path | None:
+    def _poll(
+        self, keywords: frozenset[str], recording: Path, stop: threading.Event, stale: Callable[[], bool]
+    ) -> str | Path | None:
         until = self._now() + self._config.listening_round
         speech = _Speech(self._config)
         while not stop.wait(STEP):
@@ -56,7 +60,7 @@ class Listener:
                 return recording
             if not self._robot.present():
                 raise Unreachable("cannot listen: the robot is away")
-            if self._now() > until and speech.quiet(self._now()):
+            if (self._now() > until or stale()) and speech.quiet(self._now()):
                 return None
         return None
 

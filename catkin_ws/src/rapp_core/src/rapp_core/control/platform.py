@@ -23,6 +23,7 @@ class Platform:
         self._trace = trace
         self._stop = threading.Event()
         self._offered: dict[str, Known] = {}
+        self.changes = 0  # of what the platform offers
         self._registered = False
         self._thread: threading.Thread | None = None
 
@@ -61,7 +62,7 @@ class Platform:
                 self._trace.message("repository->core registered")
             catalogue = self._hop.request("list_rapps", {}, config.register_timeout)
             known = map(self._known, catalogue["rapps"])
-            self._offered = {entry.name: entry for entry in known if entry is not None}
+            offered = {entry.name: entry for entry in known if entry is not None}
         except CoreError as error:
             _log.warning("not registered: %s", error)
             self._registered = False
@@ -69,6 +70,9 @@ class Platform:
         except (KeyError, TypeError, AttributeError) as error:
             _log.error("the platform's catalogue cannot be used: %r", error)
             return False
+        if offered != self._offered:
+            self._offered = offered
+            self.changes += 1
         return True
 
     def _known(self, entry: dict[str, Any]) -> Known | None:

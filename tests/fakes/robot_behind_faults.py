@@ -1,0 +1,66 @@
+"""A whole robot whose ways to platform and mail server have the faults that a test wants."""
+
+import shutil
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from fakes.faulty_cloud import FaultyCloud
+from fakes.faulty_mail import FaultyMail
+from fakes.whole_robot import PATIENCE, Seen, WholeRobot, entered
+
+AGAIN = 0.25  # s between two tries to be heard
+BOUND = 10.0  # s to say what failed and to listen again, once the fault is known to the robot
+
+
+class RobotBehindFaults(WholeRobot):
+    """`cloud_line` and `mail_line` are the ways."""
+
+    def __init__(
+        self, folder: Path, publish: Sequence[Path] = (), profile: Mapping[str, Any] | None = None, login: bool = False
+    ) -> None:
+        """See `WholeRobot`; `login`: the mail server wants one."""
+        super().__init__(folder, publish, profile)
+        self.cloud_line = FaultyCloud(self.cloud_port)
+        self.cloud_url = self.cloud_line.url
+        self.mail_line = FaultyMail(self.mail_port, login=login)
+        self._login = login
+
+    def _environment(self) -> dict[str, str]:
+        account = {"RAPP_SMTP_USER": "nao@home.example", "RAPP_SMTP_PASSWORD": "secret"} if self._login else {}
+        return {**super()._environment(), "RAPP_SMTP_PORT": str(self.mail_line.port), **account}
+
+    def close(self) -> None:
+        """End everything."""
+        super().close()
+        self.cloud_line.close()
+        self.mail_line.close()
+
+    def ask(self, keyword: str, state: str = "s4") -> Seen:
+        """See `WholeRobot.ask`; the microphone is text-fed, so a word costs nothing and can be said often."""
+        since, deadline = len(self.seen), time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            self.say(keyword)
+            with suppress(AssertionError):
+                return self.until(entered(state), since, AGAIN)
+        raise AssertionError(f"{keyword!r} was not heard\n{self.story(since)}")
+
+    def forget(self, name: str) -> None:
+        """Take a RApp off the robot's disk, so that it has to be downloaded again."""
+        shutil.rmtree(self.home / "rapps" / name, ignore_errors=True)
+
+    def served(self, keyword: str, words: str) -> None:
+        """Ask for a RApp; it says `words` and ends, and the robot listens again."""
+        since = len(self.seen)
+        self.ask(keyword)
+        self.until(lambda seen: seen.kind == "said" and seen.detail == words, since)
+        self.until_listening(since)
+
+    def refused(self, since: int) -> str:
+        """What the robot says in s11 on its way back to s3, within the bound."""
+        deadline = time.monotonic() + BOUND
+        said = self.until(lambda seen: (seen.kind, seen.state) == ("said", "s11"), since, BOUND)
+        self.until_listening(since, max(0.1, deadline - time.monotonic()))
+        return said.detail
