@@ -13,12 +13,14 @@ class Agent(DynamicAgent):
 """
 
 
-def write_rapp(folder: Path, name: str, body: str = "pass", keywords: tuple[str, ...] = (), **rapp: Any) -> Path:
+def write_rapp(
+    folder: Path, name: str, body: str = "pass", keywords: tuple[str, ...] = (), version: str = "1.0.0", **rapp: Any
+) -> Path:
     """A package whose dynamic agent executes `body`; gives its folder."""
     folder.mkdir(parents=True)
     manifest = {
         "name": name,
-        "version": "1.0.0",
+        "version": version,
         "description": "made for a test",
         "rapp": {
             "agent": "dynamic",
