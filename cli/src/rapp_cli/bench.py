@@ -8,6 +8,7 @@ from rapp_cli.paths import BENCHMARKS, ROOT
 
 SUBJECTS = {
     "activation": "activation.py",
+    "speech": "speech.py",
     "interpret": "interpret.py",
     "bridge": "bridge.py",
 }

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rapp_cli.home import status
+from rapp_cli.home import platform, status
 from rapp_cli.home.place import Home, Settings
 from rapp_cli.home.status import State, Status
 from rapp_cli.home.supervisor import Process
@@ -30,10 +30,10 @@ def home(tmp_path: Path) -> Home:
 
 @pytest.fixture
 def silent(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def nobody(_bridge: str) -> None:
+    async def nobody(_bridge: str, _patience: float) -> None:
         return None
 
-    monkeypatch.setattr(status, "_registered", nobody)
+    monkeypatch.setattr(platform, "registered", nobody)
 
 
 BOTH = {name: process(name) for name in ("recorder", "core_agent")}

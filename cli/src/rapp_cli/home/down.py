@@ -24,9 +24,9 @@ def run(options: argparse.Namespace) -> int:
             supervisor.stop(name)
             print(f"rapp down: {name} ended", flush=True)
         supervisor.shut_down()
-    except CommandError as error:
+    except CommandError:
         pid = supervisor.kill()
         if pid is None:
             raise
-        print(f"rapp down: killed the supervisor, process {pid}: {error}; its agents end by themselves")
+        print(f"rapp down: the supervisor does not answer: killed it, process {pid}; its agents end by themselves")
     return 0

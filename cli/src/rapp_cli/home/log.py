@@ -1,8 +1,8 @@
 """`./rapp log [agent]`: what the agents write, merged in the order of time, each line with its agent's name; follows."""
 
 import argparse
+import contextlib
 import heapq
-import os
 import re
 import sys
 import time
@@ -36,12 +36,8 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError(f"cannot find the agent {options.agent!r}: there are {', '.join(names)}")
     logs = [Log(name, home.log(name)) for name in ([options.agent] if options.agent else names)]
     width = max(len(log.name) for log in logs) if len(logs) > 1 else 0
-    try:
+    with contextlib.suppress(KeyboardInterrupt):
         _show(logs, options.lines, width, follow=not options.no_follow)
-    except BrokenPipeError:  # such as `./rapp log | head`; Python would complain when it flushes at its end
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except KeyboardInterrupt:
-        print()
     return 0
 
 

@@ -7,10 +7,8 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
-from tornado.websocket import WebSocketError, websocket_connect
-
+from rapp_cli.home import platform
 from rapp_cli.home.agents import CORE, RECORDER
 from rapp_cli.home.place import Home, add_home_option, home_of
 from rapp_cli.home.supervisor import Process, Supervisor, process_state
@@ -21,7 +19,6 @@ from rapp_link.letter import from_json
 ALL_RUN, SOMETHING_DOES_NOT, NOTHING_IS_UP = 0, 1, 3
 PATIENCE = 1.5  # s for the link's sign of life
 RUNS_A_RAPP = ("s7", "s8", "s9", "s10")  # states of the core FSM
-ALIVE = {"op": "subscribe", "topic": "/rapp_hop/alive", "type": "std_msgs/String"}
 
 
 @dataclass(frozen=True)
@@ -67,7 +64,7 @@ def read(home: Home, processes: Mapping[str, Process]) -> Status:
     agents = [_frozen(process) for process in processes.values()]
     core = _core(latest(home.timeline), processes)
     running = core is not None and core.state in RUNS_A_RAPP
-    registered = asyncio.run(_registered(home.settled().bridge)) if processes else None
+    registered = asyncio.run(platform.registered(home.settled().bridge, PATIENCE)) if processes else None
     return Status(agents, core, _rapp(home.robot / "runs") if running else None, registered, _waiting(home.robot))
 
 
@@ -98,20 +95,6 @@ def _rapp(runs: Path) -> str | None:
     return None
 
 
-async def _registered(bridge: str) -> bool | None:
-    try:
-        async with asyncio.timeout(PATIENCE):
-            socket = await websocket_connect(bridge, connect_timeout=PATIENCE)
-            try:
-                await socket.write_message(json.dumps(ALIVE))
-                message: dict[str, Any] = json.loads(await socket.read_message() or "{}")
-                return bool(json.loads(message["msg"]["data"])["cloud"])
-            finally:
-                socket.close()
-    except (OSError, WebSocketError, TimeoutError, ValueError, KeyError, TypeError):
-        return None
-
-
 def _waiting(robot: Path) -> int:
     count = 0
     for path in (robot / "link" / "outbox").glob("*/letter.json"):
@@ -133,8 +116,8 @@ def text(home: Home, status: Status, now: float) -> str:
         core = status.core
         lines += ["", f"core agent  {f'{core.state} {core.name}, since {_when(core.since, now)}' if core else 'state not known'}"]
         lines += [f"RApp        {status.rapp or 'none runs'}"]
-        platform = {True: "registered", False: "not registered: it is away", None: "not known: the link does not answer"}
-        lines += [f"platform    {platform[status.registered]}"]
+        standing = {True: "registered", False: "not registered: it is away", None: "not known: the link does not answer"}
+        lines += [f"platform    {standing[status.registered]}"]
     return "\n".join([*lines, f"mails       {status.mails_waiting} waiting to be sent"])
 
 

@@ -14,6 +14,7 @@ from tornado.websocket import WebSocketError
 from rapp_cli import mail_account
 from rapp_cli.cloud import CONTACTS, make_platform, own_rapps, write_profile
 from rapp_cli.errors import CommandError, UsageError
+from rapp_cli.home import platform
 from rapp_cli.home.agents import CORE, Agent, agents, environment
 from rapp_cli.home.place import Home, Settings, add_home_option, home_of
 from rapp_cli.home.ports import USUAL, choose, is_served
@@ -24,6 +25,7 @@ from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
 
 STEP = 0.1  # s between two looks
+REGISTERS = 12.0  # s for the robot to register with its platform; it tries every 5 s
 RECIPIENT = {"Elizabeth": "elizabeth@home.example"}
 LISTENS = "s3"
 
@@ -141,6 +143,14 @@ class _Watch:
         finally:
             listening.cancel()
         self._print("robot", "listens")
+        await self._tell_of_platform()
+
+    async def _tell_of_platform(self) -> None:
+        """A robot whose platform is away listens all the same; a platform that is there is waited for."""
+        deadline = time.monotonic() + REGISTERS
+        while not (known := await platform.registered(self._settings.bridge, REGISTERS)) and time.monotonic() < deadline:
+            await asyncio.sleep(STEP)
+        self._print("platform", "registered" if known else "not registered: it is away; the robot goes on trying")
 
     def _look(self, processes: Mapping[str, Process]) -> None:
         for name, agent in list(self._waiting.items()):
