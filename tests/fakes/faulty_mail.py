@@ -36,15 +36,16 @@ class FaultyMail(Line):
 
     def __init__(self, beyond: int, choose: Choose = lambda: NONE, login: bool = False) -> None:
         self.choose = choose
-        self._login = login
+        self.login = login
         self.met: list[Fault] = []
+        self.sent: list[bytes] = []  # contents of mails that have come to the server
         super().__init__(beyond)
 
     async def relay(self, client: Pair) -> None:
         fault = self.choose()
         server = await asyncio.open_connection(LOOPBACK, self.beyond, limit=MOST)
         try:
-            await _Talk(client, server, fault, self._login, self.met).go()
+            await _Talk(client, server, fault, self).go()
         finally:
             server[1].close()
 
@@ -52,8 +53,8 @@ class FaultyMail(Line):
 class _Talk:
     """One connection: command, reply, command, reply."""
 
-    def __init__(self, client: Pair, server: Pair, fault: Fault, login: bool, met: list[Fault]) -> None:
-        self._client, self._server, self._fault, self._login, self._met = client, server, fault, login, met
+    def __init__(self, client: Pair, server: Pair, fault: Fault, line: FaultyMail) -> None:
+        self._client, self._server, self._fault, self._line = client, server, fault, line
 
     async def go(self) -> None:
         if not await self._answer("CONNECT", b""):
@@ -72,13 +73,15 @@ class _Talk:
         """Hand a command on and the reply back; False when the connection is over."""
         fault = self._fault if self._fault.at == command else None
         if fault is not None:
-            self._met.append(fault)
-        if command == "AUTH" and self._login:
+            self._line.met.append(fault)
+        if command == "AUTH" and self._line.login:
             await self._reply(b"235 2.7.0 welcome\r\n" if fault is None else fault.reply.encode() + b"\r\n")
             return True
         reply = b"" if fault is not None and not fault.seen else await self._ask(data)
+        if command == "CONTENT" and reply:
+            self._line.sent.append(data)
         if fault is None:
-            await self._reply(_with_login(reply) if command == "EHLO" and self._login else reply)
+            await self._reply(_with_login(reply) if command == "EHLO" and self._line.login else reply)
             return True
         if fault.reply == HELD:
             await asyncio.Event().wait()

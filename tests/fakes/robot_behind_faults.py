@@ -2,7 +2,7 @@
 
 import shutil
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -40,12 +40,23 @@ class RobotBehindFaults(WholeRobot):
 
     def ask(self, keyword: str, state: str = "s4") -> Seen:
         """See `WholeRobot.ask`; the microphone is text-fed, so a word costs nothing and can be said often."""
-        since, deadline = len(self.seen), time.monotonic() + PATIENCE
+        return self.say_until(keyword, entered(state), len(self.seen))
+
+    def say_until(self, text: str, wanted: Callable[[Seen], bool], since: int) -> Seen:
+        """The person says a text again and again until something has happened."""
+        deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
-            self.say(keyword)
+            self.say(text)
             with suppress(AssertionError):
-                return self.until(entered(state), since, AGAIN)
-        raise AssertionError(f"{keyword!r} was not heard\n{self.story(since)}")
+                return self.until(wanted, since, AGAIN)
+        raise AssertionError(f"{text!r} was not heard\n{self.story(since)}")
+
+    def wait_for(self, done: Callable[[], bool]) -> None:
+        """Wait for something that the robot does not publish."""
+        deadline = time.monotonic() + PATIENCE
+        while not done():
+            assert time.monotonic() < deadline, self.story(max(0, len(self.seen) - 60))
+            time.sleep(0.05)
 
     def forget(self, name: str) -> None:
         """Take a RApp off the robot's disk, so that it has to be downloaded again."""
