@@ -46,10 +46,10 @@ def _mark(stamp: Stamp) -> str | None:
     if stamp.detail.startswith("dynamic->core rapp_"):
         return FIRST_CALL
     return {
-        "repository->core downloading": DOWNLOADING,
-        "repository->core verified": VERIFIED,
-        "repository->core installed": INSTALLED,
-        "dynamic->core first_word": FIRST_WORD,
+        "link->core downloading (asynchronous)": DOWNLOADING,
+        "link->core verified (asynchronous)": VERIFIED,
+        "link->core installed (asynchronous)": INSTALLED,
+        "dynamic->core first_word (asynchronous)": FIRST_WORD,
     }.get(stamp.detail)
 
 

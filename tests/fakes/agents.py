@@ -104,6 +104,7 @@ class FakeAgents:
         folder = self._home / "runs" / str(len(self.runs))
         run = FakeAgent(self._clock, folder, read_manifest(package), self.script, self._journal, told)
         self.runs.append(run)
+        told({"type": "activate"})
         return run
 
     def log_of(self, manifest: Manifest) -> Path:

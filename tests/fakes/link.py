@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from rapp_core.errors import CoreError, Refused, Unreachable
-from rapp_core.ports import Progress
 
 
 class FakeLink:
@@ -26,7 +25,7 @@ class FakeLink:
     def names(self) -> list[str]:
         return [name for name, _ in self.asked]
 
-    def request(self, name: str, arguments: Mapping[str, Any], timeout: float, progress: Progress | None = None) -> Any:
+    def request(self, name: str, arguments: Mapping[str, Any], timeout: float) -> Any:
         self.asked.append((name, dict(arguments)))
         if self.away:
             raise Unreachable("cannot reach the link: it is away")
@@ -35,13 +34,10 @@ class FakeLink:
         if name in self.answers:
             return self.answers[name]
         if name == "install":
-            return self._install(arguments["name"], progress)
+            return self._install(arguments["name"])
         return {"register": {"registered": True, "lease": 30}, "list_rapps": {"rapps": self.catalogue}}[name]
 
-    def _install(self, name: str, progress: Progress | None) -> dict[str, Any]:
+    def _install(self, name: str) -> dict[str, Any]:
         if name not in self.shelf:
             raise Refused(f"cannot install {name}: the store does not have it")
-        for phase in ("downloading", "verified", "installed"):
-            if progress is not None:
-                progress(phase, 1.0)
         return {"name": name, "version": "1.0.0", "path": str(self.shelf[name]), "installed": True}

@@ -109,7 +109,7 @@ def test_a_keyword_is_understood_by_the_core_agent_itself(demos: dict[str, Demo]
 def test_a_long_command_is_recorded_by_the_core_agent_and_interpreted_by_the_platform(demos: dict[str, Demo]) -> None:
     demo = demos["long"]
     assert_in_order(["s3", "s5", "s6", "s7", "s8", "s9", "s10", "s3"], demo.states("core"), demo)
-    assert_in_order(["core->repository interpret", "core->repository install voice_mail"], demo.details("message"), demo)
+    assert_in_order(["core->link interpret", "core->link install voice_mail"], demo.details("message"), demo)
     assert "Kowalska" in demo.details("heard")
 
 
@@ -125,13 +125,13 @@ def test_the_dynamic_agent_walks_figures_3_and_8(demos: dict[str, Demo]) -> None
     "messages",
     [
         pytest.param(
-            ["dynamic->core rapp_say", "core->ALTextToSpeech say (synchronous)", "ALTextToSpeech->core reply",
+            ["dynamic->core rapp_say", "core->ALTextToSpeech say", "ALTextToSpeech->core reply say",
              "core->dynamic reply rapp_say"],
             id="Figs 5 and 10: say",
         ),
         pytest.param(
             ["dynamic->core rapp_recognize", "core->ALSpeechRecognition setVocabulary", "core->ALSpeechRecognition subscribe",
-             "ALMemory->core WordRecognized", "core->dynamic reply rapp_recognize"],
+             "ALMemory->core WordRecognized (asynchronous)", "core->dynamic reply rapp_recognize"],
             id="Figs 6 and 11: recognise a word",
         ),
         pytest.param(
@@ -140,12 +140,14 @@ def test_the_dynamic_agent_walks_figures_3_and_8(demos: dict[str, Demo]) -> None
             id="Figs 7 and 9: record",
         ),
         pytest.param(
-            ["dynamic->core rapp_send_mail", "dynamic->mail server request (SMTP)", "mail server->dynamic reply delivered",
+            ["dynamic->core rapp_send_mail", "core->link send_mail", "link->mail-server mail (SMTP)",
+             "mail-server->link reply mail: taken", "link->core reply send_mail: delivered",
              "core->dynamic reply rapp_send_mail"],
             id="Fig 12: send an e-mail",
         ),
         pytest.param(
-            ["dynamic->core terminate", "core->dynamic dismantle", "dynamic->core gone", "core: dynamic agent destroyed"],
+            ["dynamic->core terminate (asynchronous)", "core->dynamic dismantle (asynchronous)",
+             "dynamic->core gone (asynchronous)", "core: dynamic agent destroyed"],
             id="dismantling",
         ),
     ],

@@ -10,12 +10,12 @@ import threading
 import uuid
 from pathlib import Path
 
-from rapp_hop.client import HopClient
 from rapp_hop.errors import HopError, Refused
 from rapp_hop.hz.delivery import Delivery
 from rapp_link.cloud_side import Platform
 from rapp_link.commands import Commands, sign_of_life
 from rapp_link.config import Config, read
+from rapp_link.events import message
 from rapp_link.jobs import JobTable
 from rapp_link.office import Office
 from rapp_link.outbox import Outbox
@@ -23,6 +23,7 @@ from rapp_link.postman import Postman
 from rapp_link.reports import Reports
 from rapp_link.ros_side import RosSide
 from rapp_link.smtp import SmtpSender
+from rapp_link.telling import TellingClient, TellingSender
 
 LAST_WORD = 1.8  # seconds from the signal to the end, whatever a thread still does
 
@@ -41,11 +42,11 @@ class Link:
         _make_home(own)
         self.config = config
         self.boot = uuid.uuid4().hex
-        self.client = HopClient(config.cloud, config.token or None)
+        self.client = TellingClient(config.cloud, config.token or None, self._tell)
         reports = Reports(own / "reports")
         outbox = Outbox(own / "outbox", config.mail.waiting)
         self.platform = Platform(self.client, config, reports)
-        self.postman = Postman(outbox, SmtpSender(config.mail), config.mail)
+        self.postman = Postman(outbox, TellingSender(SmtpSender(config.mail), self._tell), config.mail)
         delivery = Delivery(self.client, config.root, config.home) if config.root else None
         commands = Commands(config, self.platform, delivery, outbox, self.postman, reports).table()
         self.office = Office(JobTable(config.jobs, config.longest), commands, lambda event: self.ros.tell(event))
@@ -69,6 +70,9 @@ class Link:
             await self.office.close()
             await self.ros.close()
             await self.client.close()
+
+    def _tell(self, text: str) -> None:
+        self.ros.tell(message(text))
 
 
 def main() -> int:

@@ -1,4 +1,4 @@
-"""What the core is told of a job: rapp_msgs/HopEvent as a value. Pure."""
+"""What the core is told of a job, and of the link's messages to others: rapp_msgs/HopEvent as a value. Pure."""
 
 import json
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from typing import Any
 
 from rapp_hop.errors import HopError
 
-PROGRESS, DONE, FAILED = 0, 1, 2  # rapp_msgs/HopEvent
+PROGRESS, DONE, FAILED, MESSAGE = 0, 1, 2, 3  # rapp_msgs/HopEvent
 
 
 @dataclass(frozen=True)
 class Event:
-    """Progress or end of one job."""
+    """Progress or end of one job, or a message that belongs to none."""
 
     job: str
     kind: int
@@ -40,3 +40,8 @@ def failed(job: str, error: HopError) -> Event:
     """Tell why there is none."""
     result = json.dumps({"reason": error.reason}) if error.reason else ""
     return Event(job, FAILED, error=error.kind, message=str(error), result=result)
+
+
+def message(text: str) -> Event:
+    """Tell a message between the link and another agent."""
+    return Event("", MESSAGE, message=text)

@@ -92,4 +92,3 @@ def _check_body(text: str) -> str:
     if any(unicodedata.category(letter) in ("Cc", "Cs") and letter not in "\n\t" for letter in text):
         raise Refused("cannot send a text with control characters: leave them out")
     return text
-

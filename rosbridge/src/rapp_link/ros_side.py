@@ -16,7 +16,7 @@ from typing import Any
 import roslibpy
 
 from rapp_hop.errors import HopError, Invalid
-from rapp_link.events import Event
+from rapp_link.events import MESSAGE, Event
 from rapp_link.threads import in_thread
 
 _log = logging.getLogger(__name__)
@@ -87,10 +87,11 @@ class RosSide:
                 _log.warning("cannot leave rosbridge in time: leaving without farewell")
 
     def tell(self, event: Event) -> None:
-        """Publish an event; while the bridge is away it waits, the oldest is forgotten first."""
+        """Publish an event; while the bridge is away it waits, the oldest is forgotten first; messages do not wait."""
         with self._lock:
             if not self._connected:
-                self._held.append(event)
+                if event.kind != MESSAGE:
+                    self._held.append(event)
                 return
         self._publish("events", event.fields())
 

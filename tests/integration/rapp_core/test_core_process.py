@@ -115,9 +115,10 @@ def test_a_rapp_runs_without_platform_and_the_robot_listens_again(watched):
     assert said(seen) == ["hello from the RApp"]
     messages = [each[4] for each in seen if each[3] == MESSAGE]
     expected = [
-        "dynamic->core first_word", "dynamic->core rapp_say", "core->ALTextToSpeech say (synchronous)",
-        "ALTextToSpeech->core reply", "core->dynamic reply rapp_say", "dynamic->core terminate", "core->dynamic dismantle",
-        "dynamic->core gone", "core: dynamic agent destroyed",
+        "core->dynamic activate (asynchronous)", "dynamic->core first_word (asynchronous)", "dynamic->core rapp_say",
+        "core->ALTextToSpeech say", "ALTextToSpeech->core reply say", "core->dynamic reply rapp_say",
+        "dynamic->core terminate (asynchronous)", "core->dynamic dismantle (asynchronous)", "dynamic->core gone (asynchronous)",
+        "core: dynamic agent destroyed",
     ]  # fmt: skip
     assert [message for message in messages if message in expected] == expected
     assert core.core.stop() == 0

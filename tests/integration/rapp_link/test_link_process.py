@@ -77,7 +77,7 @@ class Asker:
         return self.read("asked")
 
     def outcome(self) -> dict[str, Any]:
-        while (event := self.read("job"))["kind"] == 0:
+        while (event := self.read("job"))["kind"] in (0, 3):  # progress, messages
             continue
         return event
 

@@ -35,15 +35,15 @@ INSTALLED_RAPP = [
     entered(10.7, "s6"),
     entered(10.8, "s7"),
     entered(10.85, "s7", "dynamic"),
-    message(11.0, "dynamic->core first_word"),
+    message(11.0, "dynamic->core first_word (asynchronous)"),
     message(11.1, "dynamic->core rapp_say"),
     message(11.2, "dynamic->core rapp_recognize"),
 ]
 DOWNLOAD = [
-    message(10.72, "repository->core downloading"),
-    message(10.73, "repository->core downloading"),
-    message(10.74, "repository->core verified"),
-    message(10.75, "repository->core installed"),
+    message(10.72, "link->core downloading (asynchronous)"),
+    message(10.73, "link->core downloading (asynchronous)"),
+    message(10.74, "link->core verified (asynchronous)"),
+    message(10.75, "link->core installed (asynchronous)"),
 ]
 
 
@@ -70,7 +70,7 @@ def test_end_of_sound_is_the_last_before_the_command_was_taken() -> None:
 
 
 def test_what_was_before_the_end_of_speech_does_not_count() -> None:
-    before = [message(8.0, "dynamic->core first_word"), entered(8.5, "s7")]
+    before = [message(8.0, "dynamic->core first_word (asynchronous)"), entered(8.5, "s7")]
     assert marks(10.0, [10.5], before + INSTALLED_RAPP) == marks(10.0, [10.5], INSTALLED_RAPP)
 
 

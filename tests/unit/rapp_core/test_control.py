@@ -45,7 +45,7 @@ class Home:
         listening = folder / "listening"
         context = Context(self.fake.robot, self.config, self.trace, listening, cut=self.stop, now=self.clock.now)
         self.executor = Executor(context)
-        self.platform = Platform(self.link, self.config, self.trace)
+        self.platform = Platform(self.link, self.config)
         parts = Parts(
             self.fake.robot, self.link, self.agents, self.executor, self.platform, self.lease, self.trace, self.config,
             self.stop, self.clock.now,
@@ -150,7 +150,8 @@ def test_dismantling_follows_the_order_of_the_design(home: Home) -> None:
     home.round()
     told = [m for m in home.messages() if "dynamic" in m]
     assert told == [
-        "dynamic->core first_word", "dynamic->core terminate", "core->dynamic dismantle", "dynamic->core gone",
+        "core->dynamic activate (asynchronous)", "dynamic->core first_word (asynchronous)",
+        "dynamic->core terminate (asynchronous)", "core->dynamic dismantle (asynchronous)", "dynamic->core gone (asynchronous)",
         "core: dynamic agent destroyed",
     ]  # fmt: skip
     journal = home.fake.journal

@@ -10,7 +10,6 @@ from fakes.rapps import install_rapp
 from rapp_core.config import Config
 from rapp_core.control.platform import Platform
 from rapp_core.errors import Refused
-from rapp_core.trace import Trace
 
 
 def entry(name: str, version: str = "1.0.0", **more: Any) -> dict[str, Any]:
@@ -24,7 +23,7 @@ def link() -> FakeLink:
 
 @pytest.fixture
 def platform(link: FakeLink, tmp_path: Path) -> Platform:
-    return Platform(link, Config(home=tmp_path, name="nao7"), Trace())
+    return Platform(link, Config(home=tmp_path, name="nao7"))
 
 
 def test_registers_under_its_name_then_reads_the_catalogue(platform: Platform, link: FakeLink) -> None:

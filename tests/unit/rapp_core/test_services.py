@@ -53,7 +53,7 @@ def bench(tmp_path: Path) -> Bench:
 
 def test_say_is_one_synchronous_call_then_the_reply(bench: Bench) -> None:
     bench.call("rapp_say", text="good morning", language="")
-    assert bench.messages() == ["core->ALTextToSpeech say (synchronous)", "ALTextToSpeech->core reply"]
+    assert bench.messages() == ["core->ALTextToSpeech say", "ALTextToSpeech->core reply say"]
     assert bench.fake.journal == ["say good morning"]
     assert [each.detail for each in bench.happenings if each.kind == "said"] == ["good morning"]
 
@@ -77,7 +77,10 @@ def test_recognise_follows_figure_6(bench: Bench) -> None:
     assert bench.fake.journal == ["setVocabulary", "subscribe", "unsubscribe"]
     assert bench.states() == ["/vocabulary", "/subscribe", "/await", "/threshold", "/reply"]
     assert bench.messages() == [
-        "core->ALSpeechRecognition setVocabulary", "core->ALSpeechRecognition subscribe", "ALMemory->core WordRecognized",
+        "core->ALSpeechRecognition setVocabulary", "ALSpeechRecognition->core reply setVocabulary",
+        "core->ALSpeechRecognition subscribe", "ALSpeechRecognition->core reply subscribe",
+        "ALMemory->core WordRecognized (asynchronous)",
+        "core->ALSpeechRecognition unsubscribe", "ALSpeechRecognition->core reply unsubscribe",
     ]  # fmt: skip
 
 

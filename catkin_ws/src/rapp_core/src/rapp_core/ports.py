@@ -100,13 +100,10 @@ class Robot:
     present: Callable[[], bool]  # whether the robot is connected at this moment
 
 
-Progress = Callable[[str, float], None]
-
-
 class Hop(Protocol):
     """The link: all calls that leave the robot (rapp_hop/*)."""
 
-    def request(self, name: str, arguments: Mapping[str, Any], timeout: float, progress: Progress | None = None) -> Any:
+    def request(self, name: str, arguments: Mapping[str, Any], timeout: float) -> Any:
         """Ask, wait for the end of the job, give its JSON result. Raises Refused, Unreachable, Invalid, Bug."""
 
     @property
@@ -178,6 +175,7 @@ class Agent(Protocol):
 
 
 Told = Callable[[dict[str, Any]], None]
+"""Called with what passes over a dynamic agent's channel: `activate` to it, all others from it."""
 
 
 class Agents(Protocol):

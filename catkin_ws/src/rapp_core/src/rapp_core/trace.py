@@ -49,9 +49,25 @@ class Trace:
         """The robot has recognised a text."""
         self.tell(Happening("core", "core", self.state, "heard", text))
 
-    def message(self, text: str) -> None:
-        """A message between agents or to a virtual effector or receptor, as in Figs 5 to 12 of the paper."""
-        self.tell(Happening("core", "core", self.state, "message", text))
+    def call(self, source: str, target: str, text: str) -> None:
+        """A message whose sender waits for the reply, to or from the core agent, as in Figs 5 to 12 of the paper."""
+        self.message("core", f"{source}->{target} {text}")
+
+    def send(self, source: str, target: str, text: str) -> None:
+        """A message whose sender goes on at once."""
+        self.message("core", f"{source}->{target} {text} (asynchronous)")
+
+    def reply(self, source: str, target: str, text: str) -> None:
+        """A reply to a call."""
+        self.message("core", f"{source}->{target} reply {text}")
+
+    def note(self, text: str) -> None:
+        """What the core agent has decided or done by itself."""
+        self.message("core", f"core: {text}")
+
+    def message(self, agent: str, text: str) -> None:
+        """A message told by the agent that sent or received it, in the form that rapp_msgs/AgentState describes."""
+        self.tell(Happening(agent, agent, self.state, "message", text))
 
     def tell(self, happening: Happening) -> None:
         """Tell all listeners."""

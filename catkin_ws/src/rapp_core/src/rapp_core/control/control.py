@@ -97,13 +97,12 @@ class Control:
 
     def keyword(self, share: Subsystem) -> None:
         """The core agent itself knows which RApp an isolated keyword means."""
-        self._parts.trace.message(f"core: keyword {share.memory['keyword']} means {share.memory['rapp']}")
+        self._parts.trace.note(f"keyword {share.memory['keyword']} means {share.memory['rapp']}")
 
     def long_command(self, share: Subsystem) -> None:
         """The platform interprets a long command; the core agent has only recorded it."""
         parts = self._parts
         arguments = {"recording": str(share.memory["command"]), "language": parts.config.language}
-        parts.trace.message("core->repository interpret")
         try:
             answer = parts.hop.request("interpret", arguments, parts.config.interpret_timeout)
         except CoreError as error:
@@ -131,12 +130,11 @@ class Control:
         parts, name = self._parts, str(share.memory["rapp"])
         here = parts.platform.runnable(name)
         if here is not None:
-            parts.trace.message(f"core: {name} {here.version} is installed")
+            parts.trace.note(f"{name} {here.version} is installed")
             share.memory["package"] = here.path
             return
-        parts.trace.message(f"core->repository install {name}")
         try:
-            answer = parts.hop.request("install", {"name": name}, parts.config.install_timeout, self._progress)
+            answer = parts.hop.request("install", {"name": name}, parts.config.install_timeout)
             share.memory["package"] = Path(answer["path"])
         except Unreachable as error:
             known = parts.platform.rapps().get(name)
@@ -146,9 +144,6 @@ class Control:
                 share.memory["package"] = known.path
         except CoreError as error:
             self._problem(share, not_installed(name, error), error)
-
-    def _progress(self, phase: str, _fraction: float) -> None:
-        self._parts.trace.message(f"repository->core {phase}")
 
     # s7 to s9: the dynamic agent lives
 
@@ -207,7 +202,7 @@ class Control:
             parts.lease.release()
             self._still()
         if run.alive:
-            parts.trace.message("core->dynamic dismantle")
+            parts.trace.send("core", "dynamic", "dismantle")
             run.dismantle(parts.config.dismantle if run.outcome is not None else HURRIED, parts.stop)
         parts.lease.release()
         self._still()
@@ -219,7 +214,7 @@ class Control:
         keep = parts.launcher.log_of(run.manifest) if run.manifest is not None else None
         run.end(parts.config.terminate, keep)
         self._run = None
-        parts.trace.message("core: dynamic agent destroyed")
+        parts.trace.note("dynamic agent destroyed")
 
     def _still(self) -> bool:
         """Stop all motion and sound; gives False when the robot is away."""
@@ -279,5 +274,7 @@ class Control:
         if message["type"] == "state" and message.get("kind") in DYNAMIC_KINDS:
             fields = [str(message.get(name, ""))[:200] for name in ("machine", "state", "kind", "detail")]
             trace.tell(Happening("dynamic", fields[0], fields[1], fields[2], fields[3]))  # type: ignore[arg-type]
+        elif message["type"] == "activate":
+            trace.send("core", "dynamic", "activate")
         elif message["type"] != "state":
-            trace.message(f"dynamic->core {message['type']}")
+            trace.send("dynamic", "core", message["type"])

@@ -8,7 +8,6 @@ from rapp_core.config import Config
 from rapp_core.control.installed import Known, installed
 from rapp_core.errors import CoreError
 from rapp_core.ports import Hop
-from rapp_core.trace import Trace
 
 _log = logging.getLogger(__name__)
 API_VERSION = "1.0"
@@ -17,10 +16,9 @@ API_VERSION = "1.0"
 class Platform:
     """Registers, and goes on trying while the platform is away; the robot listens meanwhile."""
 
-    def __init__(self, hop: Hop, config: Config, trace: Trace) -> None:
+    def __init__(self, hop: Hop, config: Config) -> None:
         self._hop = hop
         self._config = config
-        self._trace = trace
         self._stop = threading.Event()
         self._offered: dict[str, Known] = {}
         self.changes = 0  # of what the platform offers
@@ -56,10 +54,8 @@ class Platform:
         robot = {"robot": config.name, "kind": config.kind, "api_version": API_VERSION}
         try:
             if not self._registered:
-                self._trace.message("core->repository register")
                 self._hop.request("register", robot, config.register_timeout)
                 self._registered = True
-                self._trace.message("repository->core registered")
             catalogue = self._hop.request("list_rapps", {}, config.register_timeout)
             known = map(self._known, catalogue["rapps"])
             offered = {entry.name: entry for entry in known if entry is not None}

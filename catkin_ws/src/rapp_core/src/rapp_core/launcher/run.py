@@ -74,6 +74,7 @@ class Run:
         self.manifest = manifest
         self._told = told
         self.heartbeat = self.progress = time.monotonic()
+        told({"type": "activate"})  # before it is sent: what comes back is told by another thread
         self._channel.send(
             type="activate",
             run=self.name,

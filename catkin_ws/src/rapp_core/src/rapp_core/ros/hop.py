@@ -14,8 +14,9 @@ from rapp_msgs.msg import HopEvent
 from rapp_msgs.srv import HopRequest
 from std_msgs.msg import String
 
+from rapp_core.control.telling import Telling
 from rapp_core.errors import KINDS, Bug, CoreError, Refused, Unreachable
-from rapp_core.ports import Progress
+from rapp_core.trace import Trace
 
 SILENCE = 0.9  # s without a sign of life of the link after which it is gone
 ASKING = 3.0  # s for the link to accept a job
@@ -26,9 +27,10 @@ GONE = "cannot reach the link: it is not running, or rosbridge is away"
 class RosHop:
     """Each request is a job: accepted at once, ended by an event, by its time-out, or by the loss of the link."""
 
-    def __init__(self, stop: threading.Event) -> None:
+    def __init__(self, stop: threading.Event, trace: Trace) -> None:
         """All waiting ends as Unreachable when `stop` is set."""
         self._stop = stop
+        self._trace = trace
         self._lock = threading.Lock()
         self._jobs: dict[str, queue.Queue[Any]] = {}
         self._alive = float("-inf")
@@ -45,7 +47,7 @@ class RosHop:
         """Whether the link is there and its events would arrive: each topic is connected by itself."""
         return self.present and self._events.get_num_connections() > 0
 
-    def request(self, name: str, arguments: Mapping[str, Any], timeout: float, progress: Progress | None = None) -> Any:
+    def request(self, name: str, arguments: Mapping[str, Any], timeout: float) -> Any:
         """See `ports.Hop`."""
         deadline = time.monotonic() + timeout
         self._wait_present(min(deadline, time.monotonic() + 2 * SILENCE))
@@ -53,9 +55,11 @@ class RosHop:
         events: queue.Queue[Any] = queue.Queue(maxsize=1000)
         with self._lock:
             self._jobs[job] = events
+        tell = Telling(self._trace, name, arguments)
         try:
+            tell.asked()
             self._ask(name, job, json.dumps(arguments), timeout)
-            return self._wait(name, events, deadline, progress)
+            return self._wait(name, events, deadline, tell)
         except Unreachable:
             self._cancel.publish(job)
             raise
@@ -88,7 +92,7 @@ class RosHop:
         if not outcome.accepted:
             raise Refused(outcome.message or f"cannot {name}: the link does not accept it")
 
-    def _wait(self, name: str, events: "queue.Queue[Any]", deadline: float, progress: Progress | None) -> Any:
+    def _wait(self, name: str, events: "queue.Queue[Any]", deadline: float, tell: Telling) -> Any:
         while True:
             try:
                 event = events.get(timeout=STEP)
@@ -99,14 +103,17 @@ class RosHop:
                     raise Unreachable(f"cannot {name}: no answer in time; try again later") from None
                 continue
             if event.kind == HopEvent.PROGRESS:
-                if progress is not None:
-                    progress(event.phase, event.fraction)
+                tell.progress(event.phase)
             elif event.kind == HopEvent.FAILED:
+                tell.failed(event.error)
                 raise _error(event)
             else:
-                return _result(name, event.result)
+                return tell.answered(_result(name, event.result))
 
     def _take(self, event: Any) -> None:
+        if event.kind == HopEvent.MESSAGE:
+            self._trace.message("link", event.message)
+            return
         with self._lock:
             events = self._jobs.get(event.job)
         if events is not None and not events.full():

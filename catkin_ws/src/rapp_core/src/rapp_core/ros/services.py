@@ -41,7 +41,8 @@ class RosServices:
                 grant = self._lease.check(request._connection_header.get("rapp_channel"))
             except Refused as error:
                 return _failed(name, response, error)
-            self._trace.message(f"dynamic->core {name}")
+            self._trace.call("dynamic", "core", name)
+            reply = name
             try:
                 with self._executor.counted():
                     _allow(grant, name)
@@ -49,7 +50,8 @@ class RosServices:
                 response.success = True
             except CoreError as error:
                 _failed(name, response, error)
-            self._trace.message(f"core->dynamic reply {name}")
+                reply = f"{name}: {error.kind}"
+            self._trace.reply("core", "dynamic", reply)
             return response
 
         rospy.Service(name, cls, serve)

@@ -23,14 +23,14 @@ class StatePublisher:
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher("~state", AgentState, queue_size=1000, latch=True)
-        self._waiting: queue.Queue[Happening | None] = queue.Queue(maxsize=10_000)
+        self._waiting: queue.Queue[tuple[rospy.Time, Happening] | None] = queue.Queue(maxsize=10_000)
         self._thread = threading.Thread(target=self._publish, name="state", daemon=True)
         self._thread.start()
 
     def tell(self, happening: Happening) -> None:
         """Queue one happening; dropped when ten thousand wait, rather than delaying the robot."""
         if not self._waiting.full():
-            self._waiting.put_nowait(happening)
+            self._waiting.put_nowait((rospy.Time.now(), happening))
 
     def close(self) -> None:
         """Publish what waits, then end."""
@@ -38,9 +38,10 @@ class StatePublisher:
         self._thread.join(2)
 
     def _publish(self) -> None:
-        while (happening := self._waiting.get()) is not None:
+        while (told := self._waiting.get()) is not None:
+            stamp, happening = told
             self._publisher.publish(
-                stamp=rospy.Time.now(),
+                stamp=stamp,
                 agent=happening.agent,
                 machine=happening.machine,
                 state=happening.state,

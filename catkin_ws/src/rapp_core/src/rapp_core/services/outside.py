@@ -11,7 +11,6 @@ from typing import Any
 from rapp_core.config import Config
 from rapp_core.errors import Invalid, Refused, Unreachable
 from rapp_core.ports import Agent, Hop
-from rapp_core.trace import Trace
 
 MAIL_AGAIN = 0.5  # s between tries to hand a mail to a link that is away
 
@@ -19,13 +18,10 @@ MAIL_AGAIN = 0.5  # s between tries to hand a mail to a link that is away
 class Outside:
     """rapp_cloud_call and rapp_send_mail; a RApp may use only what its package.json names."""
 
-    def __init__(
-        self, hop: Hop, config: Config, trace: Trace, stop: threading.Event, now: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, hop: Hop, config: Config, stop: threading.Event, now: Callable[[], float] = time.monotonic) -> None:
         """No new try after `stop` is set."""
         self._hop = hop
         self._config = config
-        self._trace = trace
         self._stop = stop
         self._now = now
         self._numbers = itertools.count(1)
@@ -40,9 +36,7 @@ class Outside:
         if not isinstance(values, dict):
             raise Invalid(f"cannot call {service}: its arguments must be a JSON object")
         limit = timeout if timeout > 0 else self._config.cloud_call_timeout
-        self._trace.message(f"dynamic->repository {service}")
         result = self._hop.request("call", {"service": service, "arguments": values}, limit)
-        self._trace.message(f"repository->dynamic reply {service}")
         return json.dumps(result)
 
     def send_mail(self, run: Agent, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
@@ -57,10 +51,7 @@ class Outside:
             "attachment": attachment,
             "message_id": f"<{run.name}.{next(self._numbers)}@{self._config.name}.rapp>",
         }
-        self._trace.message("dynamic->mail server request (SMTP)")
-        state = self._hand_over(run, mail)
-        self._trace.message(f"mail server->dynamic reply {state}")
-        return state
+        return self._hand_over(run, mail)
 
     def _hand_over(self, run: Agent, mail: dict[str, Any]) -> str:
         """A link that goes away meanwhile is given the mail again: it knows by the Message-ID what it has already."""

@@ -17,10 +17,12 @@ def machine(context: Context) -> Machine:
         path = context.readable(request(share, "path"))
         player = context.robot.player
         player.stop()
-        context.trace.message("core->ALAudioPlayer playFile")
         if request(share, "loop"):
+            context.trace.send("core", "ALAudioPlayer", "playFileInLoop")
             player.loop(path, volume, balance)
         else:
+            context.trace.call("core", "ALAudioPlayer", "playFileFromPosition")
             player.play(path, position, volume, balance)
+            context.trace.reply("ALAudioPlayer", "core", "playFileFromPosition")
 
     return Machine("rapp_play_audio", {"play": Behaviour("play", play, label="delegate to e_ls")}, "play", [], ["play"])

@@ -6,6 +6,7 @@ from rapp_core.ports import Word
 from rapp_core.services.context import Context, reply, request
 
 EMPTY = "Empty"
+RECOGNISER = "ALSpeechRecognition"
 MOST = 100  # words
 LONGEST = 300.0  # s of listening
 
@@ -22,23 +23,30 @@ class _Recognition:
         words = request(share, "dictionary")
         if not 1 <= len(words) <= MOST or not all(w.strip() for w in words):
             raise Invalid(f"cannot listen: a dictionary of 1 to {MOST} words is needed")
-        self._trace.message("core->ALSpeechRecognition setVocabulary")
+        self._trace.call("core", RECOGNISER, "setVocabulary")
         self._ears.set_vocabulary(words)
+        self._trace.reply(RECOGNISER, "core", "setVocabulary")
 
     def subscribe(self, share: Subsystem) -> None:
         heard = share.inputs["heard"]
-        self._trace.message("core->ALSpeechRecognition subscribe")
-        share.memory["undo"] = self._ears.unsubscribe
+        self._trace.call("core", RECOGNISER, "subscribe")
+        share.memory["undo"] = self._unsubscribe
         self._ears.subscribe(lambda item: heard.put(item) if isinstance(item, Word) else None)
+        self._trace.reply(RECOGNISER, "core", "subscribe")
         wish = request(share, "timeout")
         timeout = min(wish, LONGEST) if wish > 0 else self._context.config.recognise_timeout
         share.memory["until"] = self._context.now() + timeout
+
+    def _unsubscribe(self) -> None:
+        self._trace.call("core", RECOGNISER, "unsubscribe")
+        self._ears.unsubscribe()
+        self._trace.reply(RECOGNISER, "core", "unsubscribe")
 
     def take(self, share: Subsystem) -> None:
         word = share.inputs["heard"].take()
         share.memory["word"] = word
         if word is not None:
-            self._trace.message("ALMemory->core WordRecognized")
+            self._trace.send("ALMemory", "core", "WordRecognized")
 
     def heard_or_late(self, share: Subsystem) -> bool:
         return share.memory["word"] is not None or self._context.now() >= float(str(share.memory["until"]))

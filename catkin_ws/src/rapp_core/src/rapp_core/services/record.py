@@ -53,13 +53,13 @@ def _machine(name: str, context: Context, check: Transition, during: Transition,
     def start(share: Subsystem) -> None:
         check(share)
         path = Path(str(share.memory["path"]))
-        trace.message("core->ALAudioRecorder startMicrophonesRecording (asynchronous)")
+        trace.send("core", "ALAudioRecorder", "startMicrophonesRecording")
         share.memory["undo"] = recorder.stop
         recorder.start(path)
         share.memory["begun"] = context.now()
 
     def stop(share: Subsystem) -> None:
-        trace.message("core->ALAudioRecorder stopMicrophonesRecording (asynchronous)")
+        trace.send("core", "ALAudioRecorder", "stopMicrophonesRecording")
         recorder.stop()
         share.memory["undo"] = None
 

@@ -14,9 +14,9 @@ def machine(context: Context) -> Machine:
         text = request(share, "text")
         if not text.strip() or len(text) > LONGEST:
             raise Invalid(f"cannot say that: a text of 1 to {LONGEST} characters is needed")
-        context.trace.message("core->ALTextToSpeech say (synchronous)")
+        context.trace.call("core", "ALTextToSpeech", "say")
         context.trace.said(text)
         context.robot.voice.say(text, request(share, "language") or context.config.language)
-        context.trace.message("ALTextToSpeech->core reply")
+        context.trace.reply("ALTextToSpeech", "core", "say")
 
     return Machine("rapp_say", {"say": Behaviour("say", say, label="delegate to e_ls")}, "say", [], ["say"])
