@@ -131,6 +131,13 @@ def sounding(folder: Path) -> Iterator[Simulator]:
         yield start("--no-world")
 
 
+@pytest.fixture(scope="module")
+def bodied(folder: Path) -> Iterator[Simulator]:
+    """A robot in the room `seen.toml`, before things to look at, that hears text and speaks silently."""
+    with _simulating(folder) as start:
+        yield start("--microphone", "text", "--voice", "silent", "--room", str(Path(__file__).with_name("seen.toml")))
+
+
 @pytest.fixture(scope="session")
 def failing() -> Callable[..., Any]:
     """A call that must fail, with NAOqi's form of an error: "Module::method", below it what is wrong, no Python traceback."""

@@ -21,6 +21,7 @@ class Config:
     person_level: float = 0.5  # share of full scale of a person's voice at the microphone
     echo: float = 0.03  # share of the robot's own voice that its microphone picks up
     world: bool = True  # whether there is a body in a room
+    room: Path | None = None  # room file; None: our own
 
 
 def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
@@ -33,6 +34,7 @@ def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
     parser.add_argument("--voice", choices=("espeak", "silent"), default=default.voice)
     parser.add_argument("--files", type=Path, action="append", help="a folder where clients may write (repeatable)")
     parser.add_argument("--ambient", type=_level, default=default.ambient, help="noise floor, RMS of 16-bit samples")
+    parser.add_argument("--room", type=Path, metavar="FILE", help="room file (default: our own)")
     parser.add_argument("--no-world", action="store_true", help="voice and ears only, no body in a room")
     options = parser.parse_args(words)
     return Config(
@@ -43,6 +45,7 @@ def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
         files=tuple(options.files) if options.files else default.files,
         ambient=options.ambient,
         world=not options.no_world,
+        room=options.room,
     )
 
 

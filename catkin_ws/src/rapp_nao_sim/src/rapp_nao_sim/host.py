@@ -17,12 +17,13 @@ from rapp_nao_sim.modules.memory import ALMemory
 from rapp_nao_sim.modules.sim_world import SimWorld
 from rapp_nao_sim.modules.speech_recognition import ALSoundDetection, ALSpeechRecognition
 from rapp_nao_sim.modules.text_to_speech import ALTextToSpeech
+from rapp_nao_sim.modules.video_device import ALVideoDevice
 from rapp_nao_sim.sound.room import Mixer, Room
 from rapp_nao_sim.speech.hearing import Hearing
 from rapp_nao_sim.speech.mouth import Mouth
 from rapp_nao_sim.speech.process import Ears
 from rapp_nao_sim.world.motion_modules import modules as motion_modules
-from rapp_nao_sim.world.process import WorldClient
+from rapp_nao_sim.world.process import WorldClient, WorldConfig
 
 _log = logging.getLogger(__name__)
 
@@ -34,7 +35,7 @@ class Host:
         self._config = config
         self._undo = ExitStack()
         self._session = qi.Session()
-        self._world = WorldClient() if config.world else None
+        self._world = WorldClient(WorldConfig(room=config.room)) if config.world else None
         self._ears = Ears() if config.microphone == "sound" else None
         self._mixer = Mixer(config.ambient)
         self._room = Room(self._mixer)
@@ -86,7 +87,9 @@ class Host:
             "ALAudioPlayer": ALAudioPlayer(mixer, config.echo),
             "SimWorld": self._sim_world,
         }
-        return modules | (motion_modules(self._world) if self._world is not None else {})
+        if self._world is None:
+            return modules
+        return modules | motion_modules(self._world) | {"ALVideoDevice": ALVideoDevice(self._world)}
 
     def look_after(self) -> None:
         """Start ears that have died anew. Raises StartError when the body has died: the robot cannot go on without."""

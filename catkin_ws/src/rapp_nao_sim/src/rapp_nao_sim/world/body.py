@@ -30,6 +30,7 @@ class Body:
         self._number = {info[1].decode(): int(info[0]) for info in infos}
         self._numbers = [self._number[name] for name in BODY]
         links = {info[12].decode(): int(info[0]) for info in infos}
+        self._links = links
         self._solid = [links.get(name, -1) for name in SHAPES]
         self._feet = [links["LAnkle"], links["RAnkle"]]
         for link in self._solid:
@@ -77,6 +78,11 @@ class Body:
         """Position of the torso's centre of mass and orientation of the torso."""
         position, orientation = self._bullet.getBasePositionAndOrientation(self._robot)
         return position, orientation
+
+    def frame(self, link: str) -> tuple[tuple[float, float, float], Quaternion]:
+        """Origin and orientation of a link's frame (not of its centre of mass)."""
+        state = self._bullet.getLinkState(self._robot, self._links[link], computeForwardKinematics=1)
+        return state[4], state[5]
 
     def velocity(self) -> tuple[float, float, float]:
         """vx, vy (m/s) and turning (rad/s) of the torso in the world."""

@@ -14,7 +14,7 @@ COLOURS = {
     "orange": (0.95, 0.42, 0.06),
     "blue": (0.30, 0.78, 0.98),
 }
-_AROUND, _ALONG = 28, 16  # faces of a shell
+_AROUND, _ALONG = 20, 10  # faces of a shell; the robot's cameras draw them all for each picture
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,17 @@
 import contextlib
 import os
 import tempfile
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rapp_nao_sim.world.errors import Refused, Unreachable
-from rapp_nao_sim.world.room import Room
+from rapp_nao_sim.world.cameras import Settings
+from rapp_nao_sim.world.errors import Refused
+from rapp_nao_sim.world.views import Shot, Views
 from rapp_nao_sim.world.worker import Worker
 
 MOVE_TIMEOUT = 30.0  # s, more than any movement at full speed takes, with its planning
-RENDER_TIMEOUT = 30.0  # s
 
 
 @dataclass(frozen=True)
@@ -38,16 +37,15 @@ class WorldClient:
     def __init__(self, config: WorldConfig | None = None) -> None:
         self._config = config or WorldConfig()
         self._physics = Worker("rapp_nao_sim.world.physics")
-        self._renderer = Worker("rapp_nao_sim.world.renderer")
-        self._drawing = threading.Lock()
-        self._room: Room | None = None
+        self._views = Views(lambda: self._physics.call("snapshot"), self._physics.alive)
 
     def start(self) -> None:
         """Start the physics process and wait until the robot is in its room; raises Invalid for a wrong room file."""
         config = self._config
         self._physics.start()
         try:
-            self._room = self._physics.call("set_up", config.room, config.posture, config.pace, timeout=config.start_timeout)
+            room = self._physics.call("set_up", config.room, config.posture, config.pace, timeout=config.start_timeout)
+            self._views.show(room)
         except BaseException:
             self.close()
             raise
@@ -55,7 +53,7 @@ class WorldClient:
     def close(self) -> None:
         """End the processes and wait for them."""
         self._physics.close()  # first: a picture that fails by the renderer's end is not tried again then
-        self._renderer.close()
+        self._views.close()
 
     def __enter__(self) -> "WorldClient":
         self.start()
@@ -156,25 +154,11 @@ class WorldClient:
 
     def photograph(self, path: Path | str) -> None:
         """Write a picture of the room as a PNG file; the physics goes on meanwhile."""
-        state = self._physics.call("snapshot")
-        with self._drawing:
-            try:
-                png = self._draw(state)
-            except Unreachable:
-                if not self.alive():
-                    raise
-                self._renderer.close()
-                png = self._draw(state)  # by a new process, once
-        _write(Path(path), png)
+        _write(Path(path), self._views.overview(self._config.width, self._config.height))
 
-    def _draw(self, state: dict[str, Any]) -> bytes:
-        if not self._renderer.alive():
-            self._renderer.close()
-            self._renderer.start()
-            self._renderer.call("set_up", self._room, timeout=RENDER_TIMEOUT)
-        config = self._config
-        png: bytes = self._renderer.call("overview", state, config.width, config.height, timeout=RENDER_TIMEOUT)
-        return png
+    def shot(self, camera: int, resolution: int, settings: Settings, colour: int) -> Shot:
+        """What a camera of the robot sees; numbers as in `cameras`."""
+        return self._views.shot(camera, resolution, settings, colour)
 
     def _tuple(self, verb: str) -> tuple[float, float, float]:
         x, y, turn = self._physics.call(verb)

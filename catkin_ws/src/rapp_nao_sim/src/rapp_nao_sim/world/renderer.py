@@ -1,23 +1,27 @@
 """The renderer process: pictures of a mirrored world, while the physics goes on in its own process.
 
-Started by WorldClient as `python -m rapp_nao_sim.world.renderer FD` when the first picture is asked for.
+Started by Views as `python -m rapp_nao_sim.world.renderer FD` when the first picture is asked for.
 """
 
 import math
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from rapp_nao_sim.world.body import Body
 from rapp_nao_sim.world.bullet import connect
+from rapp_nao_sim.world.cameras import CAMERAS, HIGH, LINK, SIZES, WIDE, Settings
+from rapp_nao_sim.world.developing import develop
 from rapp_nao_sim.world.room import Room
 from rapp_nao_sim.world.scene import Scene
 from rapp_nao_sim.world.worker import Service, serve
 
-FINER = 2  # times as many pixels are drawn in each direction, and averaged: smooth edges
-NEAR, FAR = 0.05, 20.0  # m, what the camera sees
+FINER = 2  # times as many pixels of the overview are drawn in each direction, and averaged: smooth edges
+NEAR, FAR = 0.05, 20.0  # m, what a camera sees; nearer is the robot's own head
 
 
 class Renderer:
@@ -26,7 +30,7 @@ class Renderer:
     def __init__(self, service: Service) -> None:
         self._service = service
         self._bullet = connect()
-        service.offer({"set_up": self._set_up, "overview": self._overview})
+        service.offer({"set_up": self._set_up, "overview": self._overview, "shot": self._shot})
 
     def run(self) -> None:
         """Answer until the parent leaves."""
@@ -40,30 +44,54 @@ class Renderer:
 
     def _overview(self, state: dict[str, Any], width: int, height: int) -> bytes:
         """The room from its overview camera, as PNG."""
+        self._mirror(state)
         bullet, view = self._bullet, self._room.overview
+        looking = bullet.computeViewMatrix(view.eye, view.target, (0, 0, 1))
+        lens = bullet.computeProjectionMatrixFOV(math.degrees(view.field_of_view), width / height, NEAR, FAR)
+        image = self._draw(looking, lens, (width * FINER, height * FINER), state["lamp"], shadow=1)
+        small = cv2.resize(image[:, :, ::-1], (width, height), interpolation=cv2.INTER_AREA)
+        _, png = cv2.imencode(".png", small, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+        return png.tobytes()
+
+    def _shot(self, state: dict[str, Any], number: int, resolution: int, settings: Settings, colour: int) -> tuple[bytes, float]:
+        """What a camera of the robot sees, and its exposure; without shadows, which take three times as long."""
+        self._mirror(state)
+        bullet, camera, size = self._bullet, CAMERAS[number], SIZES[resolution]
+        head = self._body.frame(LINK)
+        tilt = bullet.getQuaternionFromEuler((0, camera.pitch, 0))
+        eye, orientation = bullet.multiplyTransforms(*head, camera.offset, tilt)
+        matrix = bullet.getMatrixFromQuaternion(orientation)
+        ahead, up = matrix[0::3], matrix[2::3]
+        looking = bullet.computeViewMatrix(eye, [place + way for place, way in zip(eye, ahead, strict=True)], up)
+        lens = bullet.computeProjectionMatrixFOV(math.degrees(HIGH), math.tan(WIDE / 2) / math.tan(HIGH / 2), NEAR, FAR)
+        return develop(self._draw(looking, lens, size, state["lamp"], shadow=0), settings, colour)
+
+    def _mirror(self, state: dict[str, Any]) -> None:
         self._body.mirror(state["angles"], state["position"], state["orientation"])
         self._scene.set_door(state["door"])
         self._scene.set_lamp(state["lamp"])
-        lamp = state["lamp"]
+
+    def _draw(
+        self, looking: Sequence[float], lens: Sequence[float], size: tuple[int, int], lamp: float, shadow: int
+    ) -> npt.NDArray[np.uint8]:
+        """Red, green, blue of every pixel."""
+        bullet, (width, height) = self._bullet, size
         _, _, pixels, _, _ = bullet.getCameraImage(
-            width * FINER,
-            height * FINER,
-            bullet.computeViewMatrix(view.eye, view.target, (0, 0, 1)),
-            bullet.computeProjectionMatrixFOV(math.degrees(view.field_of_view), width / height, NEAR, FAR),
+            width,
+            height,
+            looking,
+            lens,
             lightDirection=self._room.light.direction,
             lightColor=(1.0, 0.97, 0.90),
             lightDistance=6,
             lightAmbientCoeff=0.22 + 0.42 * lamp,
             lightDiffuseCoeff=0.16 + 0.36 * lamp,
             lightSpecularCoeff=0.06,
-            shadow=1,
+            shadow=shadow,
             renderer=bullet.ER_TINY_RENDERER,
             flags=bullet.ER_NO_SEGMENTATION_MASK,
         )
-        image = np.reshape(np.asarray(pixels, np.uint8), (height * FINER, width * FINER, 4))[:, :, 2::-1]
-        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-        _, png = cv2.imencode(".png", small, [cv2.IMWRITE_PNG_COMPRESSION, 9])
-        return png.tobytes()
+        return np.ascontiguousarray(np.reshape(np.asarray(pixels, np.uint8), (height, width, 4))[:, :, :3])
 
 
 if __name__ == "__main__":
