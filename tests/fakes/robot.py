@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from fakes.clock import Clock
+from fakes.robot_body import FakeCamera, FakeFeeling, FakeMotion
 from rapp_core.errors import Invalid, Refused, Unreachable
 from rapp_core.ports import Robot, Sound, Word
 
@@ -24,9 +25,11 @@ class Body:
         self.listener: Callable[[Word | Sound], None] | None = None
 
     def note(self, text: str) -> None:
+        """Write down what the robot was told; raises Unreachable when it is away."""
         if not self.here:
             raise Unreachable("cannot reach the robot: it was taken away")
-        self.journal.append(text)
+        if text:
+            self.journal.append(text)
 
 
 class FakeRobot:
@@ -34,9 +37,12 @@ class FakeRobot:
 
     def __init__(self, clock: Clock | None = None) -> None:
         self.body = Body(clock or Clock())
+        self.motion = FakeMotion(self.body)
+        self.feeling = FakeFeeling(self.body, self.motion)
+        self.camera = FakeCamera(self.body)
         self.robot = Robot(
-            FakeVoice(self.body), FakeEars(self.body), FakeRecorder(self.body), FakePlayer(self.body), FakeBody(self.body),
-            lambda: self.body.here,
+            FakeVoice(self.body), FakeEars(self.body), FakeRecorder(self.body), FakePlayer(self.body),
+            self.motion, self.feeling, self.camera, lambda: self.body.here,
         )  # fmt: skip
 
     @property
@@ -128,14 +134,3 @@ class FakePlayer:
     def stop(self) -> None:
         self._body.note("stop playing")
         self._body.looping = None
-
-
-class FakeBody:
-    def __init__(self, body: Body) -> None:
-        self._body = body
-
-    def stop(self) -> None:
-        self._body.note("stop motion")
-
-    def release(self) -> None:
-        self._body.note("rest")

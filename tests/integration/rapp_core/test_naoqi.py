@@ -80,7 +80,7 @@ def test_a_robot_that_hangs_does_not_hang_its_caller(sim, connect):
 def test_a_module_that_is_missing_is_refused_by_name(sim, connect):
     _connection, nao = connect(sim())
     with pytest.raises(Refused, match="ALMotion"):
-        nao.body.stop()
+        nao.motion.stop()
 
 
 def test_a_folder_where_the_robot_may_not_write_is_refused(sim, connect, tmp_path_factory):

@@ -385,7 +385,7 @@ def test_motion_is_stopped_within_the_bound_and_before_anything_is_waited_for(
     home: Home, script: Script, words: str, bound: float
 ) -> None:
     stopped: list[float] = []
-    body = home.fake.robot.body
+    body = home.fake.robot.motion
     stop = body.stop
 
     def note() -> None:

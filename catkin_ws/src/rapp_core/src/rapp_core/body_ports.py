@@ -45,27 +45,33 @@ class Senses:
     bumpers: tuple[bool, bool]  # left and right foot pressed
     battery: float  # 0..1
     velocity: Pose2D  # m/s, m/s, rad/s in base_link
-    fallen: bool
+    fallen: bool  # the torso lies, or is about to
 
 
 class Movement(Protocol):
-    """One motion under way."""
+    """One motion under way. A motion that is not waited for goes on all the same."""
 
     def done(self) -> bool:
         """Whether it has ended, one way or another."""
 
+    def wait(self, seconds: float) -> bool:
+        """Wait for its end, at most `seconds` s; gives whether it has ended."""
+
     def result(self) -> bool:
-        """Once done: whether its goal is reached; False when it was stopped. Raises Refused, Unreachable."""
+        """Once done: whether the robot has carried it out; False when it was stopped. Raises Refused, Unreachable."""
+
+    def cancel(self) -> None:
+        """Stop this motion, and no other; no effect once it has ended. Raises CoreError."""
 
 
 class Motion(Protocol):
     """Virtual effector e_body as what walks and moves joints. What begins a motion returns at once. Raises CoreError."""
 
     def move_to(self, x: float, y: float, theta: float) -> Movement:
-        """Walk to a pose in the frame of the start, m, m, rad."""
+        """Walk to a pose in the frame of the start, m, m, rad; the robot stands."""
 
-    def move_velocity(self, x: float, y: float, theta: float) -> None:
-        """Walk with a velocity, m/s, m/s, rad/s, until the next motion or `stop`."""
+    def move_velocity(self, x: float, y: float, theta: float) -> Movement:
+        """Walk with a velocity, m/s, m/s, rad/s, until the next motion or a stop; the robot stands. Ends when it is stopped."""
 
     def move_joints(self, angles: Mapping[str, float], speed: float) -> Movement:
         """Move joints to angles (rad) with a share of their greatest speed; switches their motors on."""
@@ -73,17 +79,26 @@ class Motion(Protocol):
     def take_posture(self, name: str, speed: float) -> Movement:
         """Take a posture with a share of the greatest speed; switches the motors on."""
 
-    def look_at(self, x: float, y: float, z: float) -> Movement:
-        """Turn the head towards a point in base_link, m. Raises Refused when the neck does not reach it."""
+    def look_at(self, x: float, y: float, z: float, speed: float) -> Movement:
+        """Turn the head with a share of its greatest speed, so that the top camera's middle shows a point in base_link, m.
 
-    def rest(self, posture: str) -> Movement:
-        """Take a resting posture, then switch the motors off."""
+        Switches the motors on. Raises Refused when the neck does not reach it.
+        """
+
+    def relax(self) -> Movement:
+        """Switch the motors off."""
+
+    def release(self) -> None:
+        """Let the robot rest: a safe posture, then the motors off; goes on by itself when that takes longer than a moment."""
 
     def stop(self) -> None:
         """Stop all motion now; never waits for a motion under way."""
 
     def moving(self) -> bool:
-        """Whether a motion is under way."""
+        """Whether the robot walks."""
+
+    def standing(self) -> bool:
+        """Whether it stands on its feet with its motors on, and so can walk."""
 
     def postures(self) -> Sequence[str]:
         """Postures that can be taken."""
@@ -91,8 +106,11 @@ class Motion(Protocol):
     def posture(self) -> str:
         """The posture the robot is in, or "Unknown"."""
 
-    def limits(self, joints: Sequence[str]) -> Mapping[str, JointLimits]:
-        """Limits of joints. Raises Refused for a name the robot does not have."""
+    def limits(self) -> Mapping[str, JointLimits]:
+        """Every joint, and its limits."""
+
+    def angles(self, joints: Sequence[str]) -> tuple[float, ...]:
+        """Where joints are now, rad."""
 
     def pose(self) -> Pose2D:
         """Pose of base_link in odom."""
@@ -105,7 +123,10 @@ class Feeling(Protocol):
     """Virtual receptor r_body."""
 
     def senses(self) -> Senses:
-        """What the body feels now. Raises Unreachable."""
+        """What the body feels now. Raises Refused, Unreachable."""
+
+    def close(self) -> None:
+        """Let the sonars be quiet; the next `senses` wakes them. No error when the robot is away."""
 
 
 class Camera(Protocol):
@@ -115,4 +136,7 @@ class Camera(Protocol):
         """A picture taken now. Raises Refused, Unreachable."""
 
     def set_parameter(self, camera: str, parameter: int, value: int) -> None:
-        """Set a parameter by NAOqi's number. Raises Refused for one that the camera does not have."""
+        """Set a parameter by NAOqi's number. Raises Refused for a number or value that the camera does not have."""
+
+    def close(self) -> None:
+        """Let the cameras be idle; the next `capture` wakes its own. No error when the robot is away."""

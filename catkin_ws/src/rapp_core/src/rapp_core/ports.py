@@ -1,6 +1,7 @@
 """The walls of the core agent: what it needs of robot, cloud and ROS, and nothing of how they do it.
 
-Virtual effectors and receptors are the paper's (section III): e_ls the loudspeaker, r_mic the microphones, e_body the body.
+Virtual effectors and receptors are the paper's (section III): e_ls the loudspeaker, r_mic the microphones; those of
+the body are in `body_ports`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from rapp_core.body_ports import Camera, Feeling, Motion
 from rapp_core.manifest import Manifest
 
 INSIDE_PACKAGE = "/rapp/package"
@@ -78,16 +80,6 @@ class Player(Protocol):
         """Stop playing."""
 
 
-class Body(Protocol):
-    """Virtual effector e_body."""
-
-    def stop(self) -> None:
-        """Stop all motion now."""
-
-    def release(self) -> None:
-        """Take a safe posture and switch the motors off; goes on by itself when it takes longer than a moment."""
-
-
 @dataclass(frozen=True)
 class Robot:
     """All virtual effectors and receptors of one robot."""
@@ -96,7 +88,9 @@ class Robot:
     ears: Ears
     recorder: Recorder
     player: Player
-    body: Body
+    motion: Motion
+    feeling: Feeling
+    camera: Camera
     present: Callable[[], bool]  # whether the robot is connected at this moment
 
 

@@ -219,7 +219,7 @@ class Control:
     def _still(self) -> bool:
         """Stop all motion and sound; gives False when the robot is away."""
         robot, reached = self._parts.robot, True
-        for stop in (robot.body.stop, robot.player.stop, robot.voice.hush):
+        for stop in (robot.motion.stop, robot.player.stop, robot.voice.hush):
             try:
                 stop()
             except Refused as error:
@@ -249,7 +249,7 @@ class Control:
             self._end_run()
         if reached:
             try:
-                self._parts.robot.body.release()
+                self._parts.robot.motion.release()
             except CoreError as error:
                 _log.info("%s", error)
 

@@ -2,9 +2,11 @@
 
 from rapp_core.config import Config
 from rapp_core.ports import Robot
-from rapp_core.robot.naoqi.body import NaoqiBody
+from rapp_core.robot.naoqi.camera import NaoqiCamera
 from rapp_core.robot.naoqi.connection import Connection
 from rapp_core.robot.naoqi.ears import NaoqiEars
+from rapp_core.robot.naoqi.feeling import NaoqiFeeling
+from rapp_core.robot.naoqi.motion import NaoqiMotion
 from rapp_core.robot.naoqi.player import NaoqiPlayer
 from rapp_core.robot.naoqi.recorder import NaoqiRecorder
 from rapp_core.robot.naoqi.voice import NaoqiVoice
@@ -22,6 +24,8 @@ def robot(connection: Connection, config: Config) -> Robot:
         NaoqiEars(connection, subscriber(config)),
         NaoqiRecorder(connection),
         NaoqiPlayer(connection),
-        NaoqiBody(connection),
+        NaoqiMotion(connection),
+        NaoqiFeeling(connection, subscriber(config)),
+        NaoqiCamera(connection, subscriber(config)),
         lambda: connection.present,
     )

@@ -68,6 +68,10 @@ class Connection:
     def call(self, module: str, method: str, *args: Any, timeout: float | None = None) -> Any:
         """Call a method and wait for its result, at most `timeout` s. Raises Unreachable, Refused, Bug."""
         future = self.start(module, method, *args)
+        return self.result(future, module, method, timeout)
+
+    def result(self, future: Any, module: str, method: str, timeout: float | None = None) -> Any:
+        """What a call that was started gives, waited for at most `timeout` s. Raises Unreachable, Refused, Bug."""
         limit = self._timeout if timeout is None else timeout
         try:
             return future.value(round(limit * 1000))

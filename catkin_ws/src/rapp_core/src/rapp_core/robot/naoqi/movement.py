@@ -1,0 +1,71 @@
+"""One motion under way on NAOqi: the future of a call that ends when the motion does."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rapp_core.robot.naoqi.connection import Connection
+
+
+class NaoqiMovement:
+    """See `body_ports.Movement`; `halt` asks the robot to end it."""
+
+    def __init__(self, connection: Connection, module: str, method: str, future: Any, halt: Callable[[], None]) -> None:
+        self._connection = connection
+        self._call = (module, method)
+        self._future = future
+        self._halt = halt
+        self._stopped = False
+
+    def done(self) -> bool:
+        """See `body_ports.Movement`."""
+        return bool(self._future.isFinished())
+
+    def wait(self, seconds: float) -> bool:
+        """See `body_ports.Movement`."""
+        self._future.wait(round(seconds * 1000))
+        return self.done()
+
+    def result(self) -> bool:
+        """See `body_ports.Movement`; NAOqi answers some motions with whether they have reached their goal."""
+        if self._stopped:
+            return False
+        return self._connection.result(self._future, *self._call) is not False
+
+    def cancel(self) -> None:
+        """See `body_ports.Movement`."""
+        if not self.done():
+            self.note_stop()
+            self._halt()
+
+    def note_stop(self) -> None:
+        """The robot is told to stop all motion, and so this one."""
+        self._stopped = True
+
+
+class Walking:
+    """A walk with a velocity, which NAOqi only begins: it goes on until somebody ends it. See `body_ports.Movement`."""
+
+    def __init__(self, active: Callable[[], bool], begun: Any, halt: Callable[[], None], result: Callable[[Any], Any]) -> None:
+        """`begun` is the future of the call that begins it, `active` asks whether the robot walks."""
+        self._active = active
+        self._begun = begun
+        self._halt = halt
+        self._result = result
+
+    def done(self) -> bool:
+        """See `body_ports.Movement`."""
+        return bool(self._begun.isFinished()) and not self._active()
+
+    def wait(self, seconds: float) -> bool:
+        """See `body_ports.Movement`; waits for its beginning only."""
+        self._begun.wait(round(seconds * 1000))
+        return self.done()
+
+    def result(self) -> bool:
+        """See `body_ports.Movement`: it has no goal, so it ends by being stopped."""
+        self._result(self._begun)
+        return False
+
+    def cancel(self) -> None:
+        """See `body_ports.Movement`."""
+        self._halt()
