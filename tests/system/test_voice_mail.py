@@ -7,15 +7,22 @@ import subprocess
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
+from fakes.drawings import assert_kept
 from rapp_cli.paths import ROOT
+from rapp_cli.trace.command import read
+from rapp_cli.trace.figures import FIGURES, figure
+from rapp_cli.trace.mermaid import to_mermaid
+from rapp_cli.trace.messages import last_run
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(400)]
 TIMEOUT = 240  # s of one demo
+SAID_FIRST = "starting word recognition"
 SUNDAY = "I will come home on Sunday afternoon"
 
 
@@ -77,7 +84,7 @@ def demos(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Demo]]
             "--voice",
             "en-us+f2",
             "--message",
-            "I will come home on Sunday afternoon",
+            SUNDAY,
         ),
     }
     with ThreadPoolExecutor() as pool:
@@ -109,7 +116,8 @@ def test_a_keyword_is_understood_by_the_core_agent_itself(demos: dict[str, Demo]
 def test_a_long_command_is_recorded_by_the_core_agent_and_interpreted_by_the_platform(demos: dict[str, Demo]) -> None:
     demo = demos["long"]
     assert_in_order(["s3", "s5", "s6", "s7", "s8", "s9", "s10", "s3"], demo.states("core"), demo)
-    assert_in_order(["core->link interpret", "core->link install voice_mail"], demo.details("message"), demo)
+    messages = ["core->link interpret", "link->core reply interpret: voice_mail", "core->link install voice_mail"]
+    assert_in_order(messages, demo.details("message"), demo)
     assert "Kowalska" in demo.details("heard")
 
 
@@ -117,33 +125,32 @@ def test_the_dynamic_agent_walks_figures_3_and_8(demos: dict[str, Demo]) -> None
     demo = demos["keyword"]
     walked = demo.states("dynamic")
     assert walked == ["s1", "s2", "s3", "s31", "s32", "s33", "s34", "s35", "s36", "end", "s4", "s5"], demo.logs()
-    said = ["starting word recognition", "recording message", "sending e-mail"]
+    said = [SAID_FIRST, "recording message", "sending e-mail"]
     assert_in_order(said, demo.details("said"), demo)
+
+
+@pytest.mark.parametrize("number", FIGURES)
+@pytest.mark.parametrize("name", ["keyword", "long"])
+def test_messages_come_in_the_order_of_the_papers_figures(demos: dict[str, Demo], name: str, number: int) -> None:
+    drawn = [replace(item, times=1) for item in figure(last_run(read(demos[name].folder)), number)]
+    assert_kept(f"figure-{number}", to_mermaid(drawn), "tests/system/test_voice_mail.py")
 
 
 @pytest.mark.parametrize(
     "messages",
     [
         pytest.param(
-            ["dynamic->core rapp_say", "core->ALTextToSpeech say", "ALTextToSpeech->core reply say",
-             "core->dynamic reply rapp_say"],
-            id="Figs 5 and 10: say",
+            ["core->link install voice_mail", "link->repository GET timestamp.json", "repository->link reply GET timestamp.json",
+             "link->core downloading (asynchronous)", "link->repository GET voice_mail-1.0.0.hz",
+             "repository->link reply GET voice_mail-1.0.0.hz", "link->core verified (asynchronous)",
+             "link->core installed (asynchronous)", "link->core reply install voice_mail",
+             "core->dynamic activate (asynchronous)", "dynamic->core first_word (asynchronous)"],
+            id="downloading and activating",
         ),
         pytest.param(
-            ["dynamic->core rapp_recognize", "core->ALSpeechRecognition setVocabulary", "core->ALSpeechRecognition subscribe",
-             "ALMemory->core WordRecognized (asynchronous)", "core->dynamic reply rapp_recognize"],
-            id="Figs 6 and 11: recognise a word",
-        ),
-        pytest.param(
-            ["dynamic->core rapp_record", "core->ALAudioRecorder startMicrophonesRecording (asynchronous)",
-             "core->ALAudioRecorder stopMicrophonesRecording (asynchronous)", "core->dynamic reply rapp_record"],
-            id="Figs 7 and 9: record",
-        ),
-        pytest.param(
-            ["dynamic->core rapp_send_mail", "core->link send_mail", "link->mail-server mail (SMTP)",
-             "mail-server->link reply mail: taken", "link->core reply send_mail: delivered",
-             "core->dynamic reply rapp_send_mail"],
-            id="Fig 12: send an e-mail",
+            ["dynamic->core rapp_cloud_call", "core->link call profile", "link->repository profile",
+             "repository->link reply profile", "link->core reply call profile", "core->dynamic reply rapp_cloud_call"],
+            id="asking the repository agent",
         ),
         pytest.param(
             ["dynamic->core terminate (asynchronous)", "core->dynamic dismantle (asynchronous)",
@@ -152,9 +159,28 @@ def test_the_dynamic_agent_walks_figures_3_and_8(demos: dict[str, Demo]) -> None
         ),
     ],
 )  # fmt: skip
-def test_messages_come_in_the_order_of_the_papers_figures(demos: dict[str, Demo], messages: list[str]) -> None:
+def test_messages_beside_the_figures_come_in_order(demos: dict[str, Demo], messages: list[str]) -> None:
     demo = demos["keyword"]
-    assert_in_order(messages, demo.details("message"), demo)
+    assert_in_order(messages, [e["detail"] for e in demo.entries if e["kind"] == "message"], demo)
+
+
+def test_each_message_is_told_by_an_agent_that_sent_or_received_it(demos: dict[str, Demo]) -> None:
+    messages = [(e["agent"], e["detail"].split(" ")[0]) for e in demos["long"].entries if e["kind"] == "message"]
+    assert [(agent, ends) for agent, ends in messages if agent not in ends.rstrip(":").split("->")] == []
+    assert {agent for agent, _ in messages} == {"core", "link"}
+
+
+def test_a_run_is_drawn_with_all_who_took_part(demos: dict[str, Demo]) -> None:
+    folder = demos["long"].folder
+    words = [str(ROOT / "rapp"), "trace", str(folder)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.splitlines() == [str(folder / "trace.svg"), str(folder / "trace.mmd")]
+    texts = [element.text for element in ElementTree.parse(folder / "trace.svg").iter() if element.tag.endswith("}text")]
+    wanted = ["person", "core agent", "ALTextToSpeech", "dynamic agent", "link", "repository agent", "cloud agent (mail server)"]
+    assert list(dict.fromkeys(name for name in texts if name in wanted)) == wanted
+    mermaid = (folder / "trace.mmd").read_text()
+    assert f"a_core-)person: “{SAID_FIRST}”" in mermaid
+    assert f"person-)a_core: “{SUNDAY}”" in mermaid
 
 
 def test_an_interrupted_demo_leaves_no_process(tmp_path: Path) -> None:

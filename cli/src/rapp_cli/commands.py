@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rapp_cli import bench, test
 from rapp_cli.demo import command as demo
 from rapp_cli.home import down, listen, log, say, status, up
+from rapp_cli.trace import command as trace
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ COMMANDS = (
     Command("listen", "speak to it by this computer's microphone", listen.add_options, listen.run),
     Command("status", "show every agent, its state and since when", status.add_options, status.run),
     Command("log", "show what the agents write, and follow it", log.add_options, log.run),
+    Command("trace", "draw the last run as a UML sequence diagram", trace.add_options, trace.run),
     Command("down", "end them", down.add_options, down.run),
     Command("test", "check and test everything, as continuous integration does", test.add_options, test.run),
     Command("bench", "measure: " + ", ".join(bench.SUBJECTS), bench.add_options, bench.run),

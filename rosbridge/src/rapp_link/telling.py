@@ -89,7 +89,7 @@ class TellingSender:
         except HopError as error:
             self._tell(f"link: the mail is not taken ({error.kind})")
             raise
-        self._tell(f"{MAIL_SERVER}->link reply mail: {_words(outcome)}")
+        self._tell(f"{MAIL_SERVER}->link reply mail (SMTP): {_words(outcome)}")
         return outcome
 
 

@@ -1,19 +1,15 @@
 """The drawings in ARCHITECTURE.md are those of the code. `RAPP_DRAW=1 ./rapp test -- tests/unit/drawings` writes them anew."""
 
 import importlib.util
-import os
-import re
-from pathlib import Path
 from unittest.mock import create_autospec
 
 import pytest
 
+from fakes.drawings import assert_kept
 from rapp_agent import Machine, to_mermaid
 from rapp_api import DynamicAgent
-from rapp_cli.paths import ROOT, STORE
+from rapp_cli.paths import STORE
 from rapp_core.control.fsm import Acts, core_machine
-
-ARCHITECTURE = ROOT / "ARCHITECTURE.md"
 
 
 def voice_mail() -> Machine:
@@ -35,12 +31,4 @@ MACHINES = {
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_the_drawing_is_that_of_the_code(name: str) -> None:
-    text = ARCHITECTURE.read_text()
-    drawing = re.compile(rf"(<!-- drawing: {name} -->\n```mermaid\n)(.*?)(```\n)", re.DOTALL)
-    found = drawing.search(text)
-    assert found, f"ARCHITECTURE.md has no place for a drawing of {name}"
-    drawn = to_mermaid(MACHINES[name]())
-    if os.environ.get("RAPP_DRAW"):
-        Path(ARCHITECTURE).write_text(text[: found.start(2)] + drawn + text[found.end(2) :])
-        return
-    assert found[2] == drawn, "the drawing differs from the code: run RAPP_DRAW=1 ./rapp test -- tests/unit/drawings"
+    assert_kept(name, to_mermaid(MACHINES[name]()), "tests/unit/drawings")

@@ -73,9 +73,9 @@ class Server:
 @pytest.mark.parametrize(
     ("outcome", "end"),
     [
-        (Outcome(("a@x",)), "mail-server->link reply mail: taken"),
-        (Outcome(("a@x",), {"b@x": "550 no"}), "mail-server->link reply mail: taken, refused"),
-        (Outcome(later={"a@x": "450 busy"}), "mail-server->link reply mail: later"),
+        (Outcome(("a@x",)), "mail-server->link reply mail (SMTP): taken"),
+        (Outcome(("a@x",), {"b@x": "550 no"}), "mail-server->link reply mail (SMTP): taken, refused"),
+        (Outcome(later={"a@x": "450 busy"}), "mail-server->link reply mail (SMTP): later"),
         (Locked("cannot log in"), "link: the mail is not taken (unreachable)"),
     ],
 )
