@@ -27,10 +27,15 @@ class RobotBehindFaults(WholeRobot):
         self.cloud_url = self.cloud_line.url
         self.mail_line = FaultyMail(self.mail_port, login=login)
         self._login = login
+        self.microphone = "text"  # or "sound"
 
     def _environment(self) -> dict[str, str]:
         account = {"RAPP_SMTP_USER": "nao@home.example", "RAPP_SMTP_PASSWORD": "secret"} if self._login else {}
         return {**super()._environment(), "RAPP_SMTP_PORT": str(self.mail_line.port), **account}
+
+    def _words(self, name: str) -> list[str]:
+        words = super()._words(name)
+        return [word if word != "text" else self.microphone for word in words] if name == "nao_sim" else words
 
     def close(self) -> None:
         """End everything."""

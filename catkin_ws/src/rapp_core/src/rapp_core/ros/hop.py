@@ -34,6 +34,7 @@ class RosHop:
         self._lock = threading.Lock()
         self._jobs: dict[str, queue.Queue[Any]] = {}
         self._alive = float("-inf")
+        self._boot = ""  # of the link's process
         self._cancel = rospy.Publisher("rapp_hop/cancel", String, queue_size=10)
         self._events = rospy.Subscriber("rapp_hop/events", HopEvent, self._take, queue_size=1000, tcp_nodelay=True)
         rospy.Subscriber("rapp_hop/alive", String, self._sign_of_life, queue_size=10, tcp_nodelay=True)
@@ -58,8 +59,9 @@ class RosHop:
         tell = Telling(self._trace, name, arguments)
         try:
             tell.asked()
+            boot = self._boot
             self._ask(name, job, json.dumps(arguments), timeout)
-            return self._wait(name, events, deadline, tell)
+            return self._wait(name, events, deadline, tell, boot)
         except Unreachable:
             self._cancel.publish(job)
             raise
@@ -92,12 +94,13 @@ class RosHop:
         if not outcome.accepted:
             raise Refused(outcome.message or f"cannot {name}: the link does not accept it")
 
-    def _wait(self, name: str, events: "queue.Queue[Any]", deadline: float, tell: Telling) -> Any:
+    def _wait(self, name: str, events: "queue.Queue[Any]", deadline: float, tell: Telling, boot: str) -> Any:
         while True:
             try:
                 event = events.get(timeout=STEP)
             except queue.Empty:
-                if self._stop.is_set() or not self.present:
+                # A link that was started anew within its silence knows nothing of the job.
+                if self._stop.is_set() or not self.present or self._boot != boot:
                     raise Unreachable(f"cannot {name}: the link was lost; try again later") from None
                 if time.monotonic() > deadline:
                     raise Unreachable(f"cannot {name}: no answer in time; try again later") from None
@@ -119,7 +122,9 @@ class RosHop:
         if events is not None and not events.full():
             events.put_nowait(event)
 
-    def _sign_of_life(self, _message: Any) -> None:
+    def _sign_of_life(self, message: Any) -> None:
+        with contextlib.suppress(ValueError, TypeError, KeyError):
+            self._boot = str(json.loads(message.data)["boot"])
         self._alive = time.monotonic()
 
 
