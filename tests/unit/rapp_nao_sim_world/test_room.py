@@ -15,7 +15,7 @@ def test_our_own_room_has_all_that_is_promised() -> None:
     assert len(plan.walls) >= 4
     assert {"qr", "face"} <= {picture.kind for picture in plan.pictures}
     assert any(item.lamp for item in plan.cylinders)
-    assert any(box.name == "table top" for box in plan.boxes)
+    assert any(box.name == "table" for box in plan.boxes)
     assert plan.robot.posture == "Stand"
 
 

@@ -1,6 +1,8 @@
-"""SimWorld, the simulator's own module: people who speak in the room, its noise, its picture."""
+"""SimWorld, the simulator's own module: people who speak in the room, its things, door, lamp, noise and picture."""
 
+import math
 from pathlib import Path
+from typing import Any
 
 import qi
 
@@ -11,6 +13,7 @@ from rapp_nao_sim.sound.synthesis import speak
 from rapp_nao_sim.speech.hearing import Hearing
 from rapp_nao_sim.world.process import WorldClient
 
+NEAREST = 0.3  # m, to a speaking mouth; a voice has its level at 1 m, and fades with the distance
 LOUDEST = 16_000.0  # RMS of 16-bit samples; more noise would be cut off at full scale
 
 
@@ -37,9 +40,27 @@ class SimWorld(Module):
         Options: "speed" in words per minute (150), "level" from 0 to 1. With the text-fed microphone the words reach the ears
         at once, and the sound sounds on without being waited for.
         """
-        wishes = {"speed": 150.0, "level": self.__level, **(options or {})}
+        self.__say(text, voice, options or {}, 1.0)
+
+    @working
+    def personSays(self, name: str, text: str, options: dict[str, float] | None = None) -> None:  # noqa: N802
+        """A person of the room says a text with their voice, from where they stand: the level holds at 1 m from the robot.
+
+        The text-fed microphone hears them at any distance.
+        """
+        world = self.__there()
+        person = next((thing for thing in world.objects() if thing["name"] == name and thing["kind"] == "person"), None)
+        if person is None or not person["placed"]:
+            here = [thing["name"] for thing in world.objects() if thing["kind"] == "person" and thing["placed"]]
+            raise NaoqiError(f"cannot find person {name!r} in the room: there are {', '.join(here) or 'none'}")
+        x, y, _ = world.robot_pose()
+        away = max(NEAREST, math.hypot(person["x"] - x, person["y"] - y))
+        self.__say(text, person["voice"], options or {}, 1 / away)
+
+    def __say(self, text: str, voice: str, options: dict[str, float], gain: float) -> None:
+        wishes = {"speed": 150.0, "level": self.__level, **options}
         samples = speak(text, voice, int(wishes["speed"]))
-        sounding = self.__mixer.add(Sounding(samples, float(wishes["level"])))
+        sounding = self.__mixer.add(Sounding(samples, float(wishes["level"]) * gain))
         if self.__text_fed:
             self.__hearing.feed_text(text)
         else:
@@ -74,6 +95,53 @@ class SimWorld(Module):
     def getRobotPose(self) -> list[float]:  # noqa: N802
         """True pose of the robot in the room: x and y in m, theta in rad."""
         return list(self.__there().robot_pose())
+
+    @working
+    def setDoor(self, angle: float) -> None:  # noqa: N802
+        """Turn the door to an opening angle in rad; its sign says to which side, 0 is closed."""
+        self.__there().set_door(float(angle))
+
+    @working
+    def getDoor(self) -> float:  # noqa: N802
+        """Opening angle of the door, rad."""
+        return self.__there().furnishing()[0]
+
+    @working
+    def setLamp(self, level: float) -> None:  # noqa: N802
+        """Set the lamp from 0 (dark) to 1."""
+        self.__there().set_lamp(float(level))
+
+    @working
+    def getLamp(self) -> float:  # noqa: N802
+        """Level of the lamp."""
+        return self.__there().furnishing()[1]
+
+    @working
+    def placeObject(self, name: str, x: float, y: float, z: float, theta: float) -> None:  # noqa: N802
+        """Put a thing somewhere: where the room file has `centre`, and `yaw` or `facing`, of its first part. Not into the robot."""
+        self.__there().place_object(name, (x, y, z, theta))
+
+    @working
+    def removeObject(self, name: str) -> None:  # noqa: N802
+        """Take a thing or a person out of the room; placing brings it back."""
+        self.__there().remove_object(name)
+
+    @working
+    def placePerson(self, name: str, x: float, y: float, *theta: float) -> None:  # noqa: N802
+        """Put a person on the floor, facing theta or, without it, the robot."""
+        world = self.__there()
+        robot_x, robot_y, _ = world.robot_pose()
+        world.place_person(name, (x, y, theta[0] if theta else math.atan2(robot_y - y, robot_x - x)))
+
+    @working
+    def listObjects(self) -> list[dict[str, Any]]:  # noqa: N802
+        """Every thing of the room: name, kind (box, cylinder, picture, person), placed, x, y, z, theta; voice of a person."""
+        return self.__there().objects()
+
+    @working
+    def loadRoom(self, name: str) -> None:  # noqa: N802
+        """Have the room of another file, with the robot at its start there."""
+        self.__there().load_room(Path(name))
 
     @working
     def photograph(self, name: str) -> None:

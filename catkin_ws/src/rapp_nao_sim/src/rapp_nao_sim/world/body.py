@@ -84,6 +84,10 @@ class Body:
         state = self._bullet.getLinkState(self._robot, self._links[link], computeForwardKinematics=1)
         return state[4], state[5]
 
+    def touches(self, other: int) -> bool:
+        """Whether the robot touches or overlaps another body."""
+        return bool(self._bullet.getClosestPoints(self._robot, other, 0.0))
+
     def velocity(self) -> tuple[float, float, float]:
         """vx, vy (m/s) and turning (rad/s) of the torso in the world."""
         (x, y, _), (_, _, turn) = self._bullet.getBaseVelocity(self._robot)

@@ -15,8 +15,8 @@ from rapp_nao_sim.world import postures, room
 from rapp_nao_sim.world.body import Body
 from rapp_nao_sim.world.bullet import connect
 from rapp_nao_sim.world.errors import Invalid, Refused
+from rapp_nao_sim.world.furnishing import Furnishing
 from rapp_nao_sim.world.motion import Motion
-from rapp_nao_sim.world.scene import Scene
 from rapp_nao_sim.world.worker import WAIT, Service, serve
 
 STEP = 1 / 240  # s of one step of the physics
@@ -51,11 +51,10 @@ class Physics:
         name = posture or start.posture
         if name not in known:
             raise Invalid(f"cannot start in posture {name!r}: known are {', '.join(known)}; correct [robot] of the room file")
-        self._scene = Scene(bullet, plan, pictures=False)
         self._body = Body(bullet, looks=False)
+        self._furnishing = Furnishing(bullet, plan, self._body.touches, self._wake)
         self._motion = Motion(bullet, self._body, known, self._service.answer)
         self._motion.begin(name, (start.x, start.y), start.theta)
-        self._door, self._lamp = plan.door.angle, plan.light.lamp
         self._service.offer(self._commands())
         return plan
 
@@ -87,9 +86,9 @@ class Physics:
             "awake": motion.awake,
             "fallen": self._fallen,
             "push": self._push,
-            "set_door": self._set_door,
-            "set_lamp": self._set_lamp,
+            "load_room": self._load_room,
             "snapshot": self._snapshot,
+            **self._furnishing.commands(),
         }
 
     def run(self) -> None:
@@ -134,17 +133,19 @@ class Physics:
             raise Refused(f"cannot push: give finite newtons and more than 0, at most {LONGEST_PUSH:g} s")
         self._pushes.append(((x, y, z), seconds))
 
-    def _set_door(self, angle: float) -> None:
-        if not abs(angle) <= math.pi:
-            raise Refused("cannot turn the door: its opening angle is at most pi to each side")
-        self._door = float(angle)
-        self._scene.set_door(self._door)
-        self._still = 0
+    def _load_room(self, file: Path) -> room.Room:
+        plan = room.load(file)
+        start = plan.robot
+        if start.posture not in postures.load():
+            raise Invalid(f"cannot start in posture {start.posture!r}: known are {', '.join(postures.load())}")
+        self._motion.stop()
+        self._furnishing.furnish(plan)
+        self._motion.begin(start.posture, (start.x, start.y), start.theta)
+        return plan
 
-    def _set_lamp(self, level: float) -> None:
-        if not 0 <= level <= 1:
-            raise Refused("cannot set the lamp: its level is from 0 to 1")
-        self._lamp = float(level)
+    def _wake(self) -> None:
+        """Let the physics go on after a change."""
+        self._still = 0
 
     def _snapshot(self) -> dict[str, Any]:
         position, orientation = self._body.base()
@@ -152,9 +153,7 @@ class Physics:
             "angles": self._body.angles(),
             "position": position,
             "orientation": orientation,
-            "door": self._door,
-            "lamp": self._lamp,
-        }
+        } | self._furnishing.state()
 
 
 def _pick(values: dict[str, float], names: Sequence[str]) -> list[float]:

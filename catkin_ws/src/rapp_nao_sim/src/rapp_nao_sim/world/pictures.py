@@ -17,7 +17,9 @@ def paint(kind: str, text: str = "") -> Image:
         case "qr":
             return _qr(text)
         case "face":
-            return _face()
+            return _bytes(_framed(_portrait((0.55, 0.50, 0.42)), 18, (0.18, 0.24, 0.30)))
+        case "head":
+            return _bytes(_portrait((0.10, 0.12, 0.16)))
         case "landscape":
             return _landscape()
         case _:
@@ -40,7 +42,7 @@ def _inside(u: _Grid, v: _Grid, y: float, width: float, height: float) -> _Grid:
     return 1 / (1 + np.exp(((u / width) ** 2 + ((v - y) / height) ** 2 - 1) * 14))
 
 
-def _face() -> Image:
+def _portrait(behind: tuple[float, float, float]) -> npt.NDArray[Any]:
     """A shaded face with the dark eyes, bright cheeks and nose that face detectors look for; nobody's."""
     v, u = np.mgrid[0:_SIDE, 0:_SIDE].astype(float)
     u, v = (u - _SIDE / 2) / (_SIDE / 2), (v - _SIDE * 0.52) / (_SIDE / 2)
@@ -56,14 +58,14 @@ def _face() -> Image:
     head = _inside(u, v, 0, 0.58, 0.78)
     hair = _inside(u, v, -0.12, 0.64, 0.82) * (v < -0.38 + 0.25 * u * u)
     skin = np.clip(light, 0, 1)[..., None] * np.array([0.659, 0.813, 0.988])
-    image = np.full((_SIDE, _SIDE, 3), (0.55, 0.50, 0.42))
+    image = np.full((_SIDE, _SIDE, 3), behind)
     for share, colour in (
         (_inside(u, v, 1.05, 0.75, 0.4), (0.35, 0.20, 0.15)),
         (hair, (0.10, 0.12, 0.16)),
         (head * (1 - hair), skin),
     ):
         image += share[..., None] * (np.asarray(colour) - image)
-    return _bytes(_framed(image, 18, (0.18, 0.24, 0.30)))
+    return image
 
 
 def _landscape() -> Image:

@@ -10,6 +10,7 @@ from typing import Any
 
 from rapp_nao_sim.world.cameras import Settings
 from rapp_nao_sim.world.errors import Refused
+from rapp_nao_sim.world.room import Room
 from rapp_nao_sim.world.views import Shot, Views
 from rapp_nao_sim.world.worker import Worker
 
@@ -44,8 +45,7 @@ class WorldClient:
         config = self._config
         self._physics.start()
         try:
-            room = self._physics.call("set_up", config.room, config.posture, config.pace, timeout=config.start_timeout)
-            self._views.show(room)
+            self._views.show(lambda: self._room("set_up", config.room, config.posture, config.pace))
         except BaseException:
             self.close()
             raise
@@ -152,6 +152,32 @@ class WorldClient:
         """Set the lamp from 0 (dark) to 1."""
         self._physics.call("set_lamp", level)
 
+    def furnishing(self) -> tuple[float, float]:
+        """Angle of the door and level of the lamp."""
+        door, lamp = self._physics.call("furnishing")
+        return float(door), float(lamp)
+
+    def place_object(self, name: str, place: Sequence[float]) -> None:
+        """Put a thing at x, y, z, theta: what `centre` and `yaw` or `facing` of its first part are in the room file."""
+        self._physics.call("place_object", name, list(place))
+
+    def place_person(self, name: str, place: Sequence[float]) -> None:
+        """Put a person on the floor at x, y, facing theta."""
+        self._physics.call("place_person", name, list(place))
+
+    def remove_object(self, name: str) -> None:
+        """Take a thing or a person out of the room; placing brings it back."""
+        self._physics.call("remove_object", name)
+
+    def objects(self) -> list[dict[str, Any]]:
+        """Every thing: name, kind, placed, x, y, z, theta; voice of a person."""
+        found: list[dict[str, Any]] = self._physics.call("objects")
+        return found
+
+    def load_room(self, file: Path) -> None:
+        """Have another room, with the robot at its start; raises Invalid for a wrong room file."""
+        self._views.show(lambda: self._room("load_room", file))
+
     def photograph(self, path: Path | str) -> None:
         """Write a picture of the room as a PNG file; the physics goes on meanwhile."""
         _write(Path(path), self._views.overview(self._config.width, self._config.height))
@@ -159,6 +185,10 @@ class WorldClient:
     def shot(self, camera: int, resolution: int, settings: Settings, colour: int) -> Shot:
         """What a camera of the robot sees; numbers as in `cameras`."""
         return self._views.shot(camera, resolution, settings, colour)
+
+    def _room(self, verb: str, *args: Any) -> Room:
+        room: Room = self._physics.call(verb, *args, timeout=self._config.start_timeout)
+        return room
 
     def _tuple(self, verb: str) -> tuple[float, float, float]:
         x, y, turn = self._physics.call(verb)

@@ -70,6 +70,7 @@ class Renderer:
         self._body.mirror(state["angles"], state["position"], state["orientation"])
         self._scene.set_door(state["door"])
         self._scene.set_lamp(state["lamp"])
+        self._scene.arrange(state["places"])
 
     def _draw(
         self, looking: Sequence[float], lens: Sequence[float], size: tuple[int, int], lamp: float, shadow: int

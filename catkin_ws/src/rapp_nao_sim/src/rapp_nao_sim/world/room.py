@@ -10,7 +10,7 @@ from typing import Any
 from rapp_nao_sim.world.errors import Invalid
 
 FILE = Path(__file__).with_name("room.toml")
-PICTURES = ("qr", "face", "landscape", "planks")
+PICTURES = ("qr", "face", "head", "landscape", "planks")
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
@@ -80,13 +80,18 @@ class Wall:
 
 @dataclass(frozen=True)
 class Box:
-    """A box with its edges' lengths."""
+    """A box with its edges' lengths.
+
+    Boxes, cylinders and pictures with one name are one thing, moved as a whole by the first of them; not `placed`, it is not in the
+    room at the start.
+    """
 
     name: str
     size: Triple
     centre: Triple
     colour: Triple
     yaw: float = 0.0
+    placed: bool = True
 
 
 @dataclass(frozen=True)
@@ -99,11 +104,12 @@ class Cylinder:
     centre: Triple
     colour: Triple
     lamp: bool = False
+    placed: bool = True
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A flat upright picture; kind "qr" shows `text` as a QR code."""
+    """An upright picture; kind "qr" shows `text` as a QR code; bent backwards with a radius, or flat."""
 
     name: str
     kind: str
@@ -111,6 +117,21 @@ class Picture:
     facing: float  # rad, about z
     size: Pair
     text: str = ""
+    bend: float = 0.0  # m
+    placed: bool = True
+
+
+@dataclass(frozen=True)
+class Person:
+    """Somebody who stands in the room and speaks with an espeak-ng voice."""
+
+    name: str
+    place: Pair
+    facing: float = 0.0
+    height: float = 1.2
+    voice: str = "en-us+m3"
+    colour: Triple = (0.20, 0.35, 0.55)  # of the shirt
+    placed: bool = True
 
 
 @dataclass(frozen=True)
@@ -126,9 +147,10 @@ class Room:
     boxes: tuple[Box, ...] = ()
     cylinders: tuple[Cylinder, ...] = ()
     pictures: tuple[Picture, ...] = ()
+    people: tuple[Person, ...] = ()
 
 
-_LISTS: dict[str, type[Any]] = {"walls": Wall, "boxes": Box, "cylinders": Cylinder, "pictures": Picture}
+_LISTS: dict[str, type[Any]] = {"walls": Wall, "boxes": Box, "cylinders": Cylinder, "pictures": Picture, "people": Person}
 _TABLES: dict[str, type[Any]] = {"floor": Floor, "light": Light, "robot": Start, "door": Door, "overview": Overview}
 
 
@@ -214,6 +236,8 @@ def _lengths_of_things(room: Room) -> Iterator[tuple[str, float]]:
         yield repr(box.name), min(box.size)
     for picture in room.pictures:
         yield repr(picture.name), min(picture.size)
+    for person in room.people:
+        yield repr(person.name), person.height
 
 
 def _check(room: Room) -> None:
@@ -223,7 +247,22 @@ def _check(room: Room) -> None:
     for kind in [room.floor.picture, *(picture.kind for picture in room.pictures)]:
         if kind not in PICTURES:
             raise Invalid(f"cannot use the room: unknown picture {kind!r}; known are {', '.join(PICTURES)}")
+    _check_names(room)
     if not 0 <= room.light.lamp <= 1:
         raise Invalid("cannot use the room: 'lamp' of [light] must be from 0 to 1")
     if not 0.05 < room.overview.field_of_view < 3:
         raise Invalid("cannot use the room: 'field_of_view' of [overview] must be from 0.05 to 3 rad")
+
+
+def _check_names(room: Room) -> None:
+    """Every thing has a name, and every person one of their own."""
+    people = [person.name for person in room.people]
+    names = [box.name for box in room.boxes] + [item.name for item in room.cylinders]
+    names += [picture.name for picture in room.pictures]
+    for name in people:
+        if people.count(name) + names.count(name) > 1:
+            raise Invalid(
+                f"cannot use the room: {name!r} is the name of a person and of another; give each person a name of their own"
+            )
+    if not all([*people, *names]):
+        raise Invalid("cannot use the room: a name is empty")

@@ -33,10 +33,10 @@ class Views:
         self._lock = threading.Lock()
         self._room: Room | None = None
 
-    def show(self, room: Room) -> None:
-        """Draw this room from now on."""
+    def show(self, prepare: Callable[[], Room]) -> None:
+        """Draw another room from now on: no picture is begun while it is prepared."""
         with self._lock:
-            self._room = room
+            self._room = prepare()
             self._renderer.close()
 
     def close(self) -> None:
