@@ -74,7 +74,7 @@ def busy(robot, home):
 
 
 def moving(robot):
-    return robot.call("ALMotion", "moveIsActive")
+    return not robot.call("ALMotion", "areResourcesAvailable", ["HeadYaw"])
 
 
 def test_the_robot_is_still_after_kill_9_and_the_next_core_agent_clears_up(robot, start, home, wait_for):

@@ -72,18 +72,19 @@ def test_angles_are_set_changed_and_interpolated(motion: Any) -> None:
     assert motion.getAngles("HeadYaw", False) == pytest.approx([0.2])
     motion.setAngles("LHand", 1.0, 0.5)
     motion.changeAngles("HeadYaw", -0.2, 0.5)
-    while motion.moveIsActive():
+    while not motion.areResourcesAvailable(["HeadYaw", "LHand"]):
         time.sleep(0.02)
     assert motion.getAngles(["HeadYaw", "LHand"], False) == pytest.approx([0.0, 1.0])
 
 
 def test_stopping_ends_what_another_call_waits_for(motion: Any) -> None:
     waiting = motion.angleInterpolation("HeadYaw", 1.0, 30.0, True, _async=True)
-    while not motion.moveIsActive():
+    while motion.areResourcesAvailable("HeadYaw"):
         time.sleep(0.02)
-    motion.stopMove()
+    assert motion.moveIsActive() is False  # that is for walking
+    motion.killTasksUsingResources(["HeadYaw"])
     waiting.value(TIMEOUT)
-    assert motion.moveIsActive() is False
+    assert motion.areResourcesAvailable("HeadYaw")
     assert motion.getAngles("HeadYaw", False)[0] < 0.9
 
 
@@ -125,7 +126,3 @@ def test_wrong_calls_are_answered_with_the_reason(motion: Any, method: str, args
     with pytest.raises(RuntimeError, match=f"ALMotion::{method}") as caught:
         getattr(motion, method)(*args)
     assert said in str(caught.value)
-
-
-def test_walking_is_not_offered(motion: Any) -> None:
-    assert not hasattr(motion, "moveTo")

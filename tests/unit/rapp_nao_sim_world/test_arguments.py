@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rapp_nao_sim.naoqi import NaoqiError
-from rapp_nao_sim.world.arguments import MOST_POINTS, joints, relative, spread, ways
+from rapp_nao_sim.world.arguments import MOST_POINTS, joints, spread, ways
 from rapp_nao_sim.world.model import BODY
 
 
@@ -33,9 +33,3 @@ def test_values_over_time() -> None:
     for wrong in ([[1], []], [[1]], [[0.0] * MOST_POINTS, [0.0]], []):
         with pytest.raises(NaoqiError):
             ways(wrong, 2)
-
-
-def test_a_pose_in_another_frame() -> None:
-    x, y, theta = relative((1.0, 2.0, math.pi / 2), (1.0, 3.0, -math.pi / 2))
-    assert (x, y) == pytest.approx((1.0, 0.0))
-    assert abs(theta) == pytest.approx(math.pi)

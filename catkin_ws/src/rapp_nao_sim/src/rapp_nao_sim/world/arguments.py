@@ -9,8 +9,6 @@ from rapp_nao_sim.world.model import CHAINS, JOINTS
 
 MOST_POINTS = 1000  # of one interpolation
 
-Pose = tuple[float, float, float]
-
 
 def joints(names: str | Sequence[str]) -> list[str]:
     """The joints meant by names of joints and groups; raises NaoqiError for an unknown one."""
@@ -48,10 +46,3 @@ def number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise NaoqiError(f"cannot use {value!r} as a number")
     return float(value)
-
-
-def relative(origin: Pose, pose: Pose) -> Pose:
-    """A pose (m, m, rad) in the frame of another; the angle is between -pi and pi."""
-    x, y, turn = pose[0] - origin[0], pose[1] - origin[1], pose[2] - origin[2]
-    cos, sin = math.cos(origin[2]), math.sin(origin[2])
-    return (cos * x + sin * y, cos * y - sin * x, math.atan2(math.sin(turn), math.cos(turn)))

@@ -1,38 +1,26 @@
-"""Moves the body: joints on tracks by their motors, changes of posture kinematically, stiffness.
+"""Moves the body: joints on tracks by their motors, walking, changes of posture kinematically, stiffness.
 
 A change of posture sets joints and torso along a way that always rests on the floor and hands over to the physics at its end;
 meanwhile joints that are commanded one by one follow their own tracks.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from rapp_nao_sim.world.body import Body, Quaternion
+from rapp_nao_sim.world.body import Body
+from rapp_nao_sim.world.change import Change, upright
 from rapp_nao_sim.world.errors import Refused
 from rapp_nao_sim.world.model import BODY, CHAINS, JOINTS, TWINS
-from rapp_nao_sim.world.moves import Track, clip, direct, ease, posture_time, through
+from rapp_nao_sim.world.moves import Track, clip, direct, posture_time, through
 from rapp_nao_sim.world.postures import LEAN_TOLERANCE, Posture, family, recognise
+from rapp_nao_sim.world.walk import Walk, ready
 
 _SETTLE = 0.3  # s of physics after a change, before it is judged
 _CALM = 0.8  # speed of waking up and resting
 _SLIP = 0.01  # rad that a limp joint gives before its gears slip
 Ways = Sequence[Sequence[float]]  # for each joint, its values one after another
 _Answer = Callable[[int, bool], None]
-
-
-@dataclass(frozen=True)
-class _Change:
-    """A change of posture under way."""
-
-    number: int  # of the request that waits for it
-    posture: Posture
-    begin: float
-    end: float
-    angles: Mapping[str, float]  # at the beginning
-    orientations: tuple[Quaternion, Quaternion]
-    feet: tuple[float, float]
-    release: bool  # remove the stiffness at the end
 
 
 class Motion:
@@ -46,8 +34,9 @@ class Motion:
         self._now = 0.0
         self._tracks: dict[str, Track] = {}
         self._jobs: dict[int, set[str]] = {}
-        self._change: _Change | None = None
+        self._change: Change | None = None
         self._moved = True
+        self.walk = Walk(answer)
         self.quiet = False  # nothing was commanded, and no limp joint gave way, in the last tick
         self.targets = body.angles()
         self.stiffness = dict.fromkeys(BODY, 1.0)
@@ -55,7 +44,7 @@ class Motion:
     def begin(self, name: str, feet: tuple[float, float], theta: float) -> None:
         """Put the robot in a posture at a place, at once."""
         posture = self._posture(name)
-        self._body.put(posture.angles, self._upright(theta, posture.pitch), feet)
+        self._body.put(posture.angles, upright(self._bullet, theta, posture.pitch), feet)
         self.targets = dict(posture.angles)
         self._moved = True
 
@@ -69,6 +58,9 @@ class Motion:
         if self._change is not None and self._now >= self._change.end + _SETTLE:
             self._finish(self._change)
         self._slip()
+        if self.walk.active:
+            self.targets.update(self.walk.tick(seconds, self.targets, self._body.angles()))
+            self._moved = True
         self.quiet = not self._moved and not self.moving()
         if self._moved:
             self._body.drive(self.targets, self.stiffness)
@@ -80,6 +72,7 @@ class Motion:
         if not 0 < fraction <= 1:
             raise Refused(f"cannot move at {fraction:g} of the greatest speed; give more than 0 and at most 1")
         _check(names, angles)
+        self._spare(names)
         for name, angle in zip(names, angles, strict=True):
             for joint in (name, *_twin(name)):
                 self._replace(joint, direct(joint, self._now, self.targets[joint], clip(joint, angle), fraction))
@@ -90,6 +83,7 @@ class Motion:
         for name, way, when in zip(names, goals, times, strict=True):
             if not way or len(way) != len(when) or any(b <= a for a, b in zip((0.0, *when), when, strict=False)):
                 raise Refused(f"cannot move {name}: it needs as many rising times above 0 as angles")
+        self._spare(names)
         joints: set[str] = set()
         for name, way, when in zip(names, goals, times, strict=True):
             for joint in (name, *_twin(name)):
@@ -105,12 +99,24 @@ class Motion:
         if not self.awake():
             raise Refused("cannot take a posture: the legs have no stiffness; wake the robot up first")
         self.stop()
+        self.walk.abandon()
         pitch, roll = self._body.lean()
         start, (_, orientation) = self._body.angles(), self._body.base()
         time = posture_time(start, dict(posture.angles), abs(pitch - posture.pitch) + abs(roll), speed)
         x, y, theta = self._body.pose()
-        way = (orientation, self._upright(theta, posture.pitch))
-        self._change = _Change(number, posture, self._now, self._now + time, start, way, (x, y), release)
+        way = (orientation, upright(self._bullet, theta, posture.pitch))
+        self._change = Change(number, posture, self._now, self._now + time, start, way, (x, y), release)
+
+    def walk_to(self, number: int, points: Ways, share: float, lift: float) -> None:
+        """Walk to poses seen from where the robot is; answers at the end, false when something stopped it."""
+        self._ready_to_walk()
+        self.walk.go(number, points, share, lift)
+
+    def walk_at(self, velocity: Sequence[float], share: float, lift: float) -> None:
+        """Walk at a velocity until told otherwise."""
+        if any(velocity):
+            self._ready_to_walk()
+        self.walk.drive(velocity, share, lift)
 
     def wake_up(self, number: int) -> None:
         """Stiffen all joints; a robot that is on its feet stands up."""
@@ -142,11 +148,20 @@ class Motion:
         self._moved = True
 
     def stop(self) -> None:
-        """End all movement here; who waits for it hears false."""
-        self._tracks.clear()
-        for number in self._jobs:
-            self._answer(number, False)
-        self._jobs.clear()
+        """End all movement; who waits for it hears false. A walking robot comes to stand."""
+        self.stop_joints(BODY)
+        self.stop_posture()
+        self.walk.stop()
+
+    def stop_joints(self, names: Sequence[str]) -> None:
+        """End the movement of joints here."""
+        _check(names)
+        for name in names:
+            if self._tracks.pop(name, None) is not None:
+                self._fail(name)
+
+    def stop_posture(self) -> None:
+        """End a change of posture here."""
         change, self._change = self._change, None
         if change is not None:
             self._moved = True
@@ -154,7 +169,22 @@ class Motion:
 
     def moving(self) -> bool:
         """Whether a command is under way."""
-        return bool(self._tracks) or self._change is not None
+        return bool(self._tracks) or self._change is not None or self.walk.active
+
+    def busy(self, names: Sequence[str]) -> bool:
+        """Whether a command moves any of these joints."""
+        _check(names)
+        walking = self.walk.active and any(name in CHAINS["Legs"] for name in names)
+        return self._change is not None or walking or any(name in self._tracks for name in names)
+
+    def velocity(self) -> tuple[float, float, float]:
+        """Ahead, to the left (m/s) and turning (rad/s): of the step under way, or of the torso when it does not walk."""
+        walking = self.walk.velocity()
+        if walking is not None:
+            return walking
+        x, y, turning = self._body.velocity()
+        cos, sin = math.cos(self._body.heading()), math.sin(self._body.heading())
+        return (cos * x + sin * y, cos * y - sin * x, turning)
 
     def awake(self) -> bool:
         """Whether the legs have stiffness."""
@@ -197,22 +227,43 @@ class Motion:
                 self._answer(number, True)
 
     def _replace(self, joint: str, track: Track) -> None:
+        self._fail(joint)
+        self.walk.release([joint])
+        self._tracks[joint] = track
+
+    def _fail(self, joint: str) -> None:
+        """Tell who waits for a joint that it will not arrive."""
         for number, joints in list(self._jobs.items()):
             if joint in joints:
                 del self._jobs[number]
                 self._answer(number, False)
-        self._tracks[joint] = track
 
-    def _transform(self, change: _Change) -> None:
-        share = ease((self._now - change.begin) / (change.end - change.begin))
-        for name in BODY:
-            if name not in self._tracks:
-                self.targets[name] = change.angles[name] + (change.posture.angles[name] - change.angles[name]) * share
-        orientation = self._bullet.getQuaternionSlerp(*change.orientations, share)
+    def _spare(self, names: Sequence[str]) -> None:
+        """Refuse joints that the walk needs."""
+        needed = [name for name in names if name in CHAINS["Legs"]] if self.walk.active else []
+        if needed:
+            raise Refused(f"cannot move {needed[0]}: the robot walks on it; stop the walk first")
+
+    def _ready_to_walk(self) -> None:
+        if not self.awake():
+            raise Refused("cannot walk: the legs have no stiffness; wake the robot up first")
+        if self._change is not None:
+            raise Refused("cannot walk: the posture is changing; wait for its end")
+        if self.walk.active:
+            return
+        group = self.posture()[1]
+        if group != "Standing":
+            raise Refused(f"cannot walk: the robot is {group.lower()}; take posture Stand first")
+        ready(self.targets)
+        self.stop_joints(CHAINS["Legs"])
+
+    def _transform(self, change: Change) -> None:
+        angles, orientation = change.at(self._now, self._bullet)
+        self.targets.update((name, angle) for name, angle in angles.items() if name not in self._tracks)
         self._body.put(self.targets, orientation, change.feet)
         self._moved = True
 
-    def _finish(self, change: _Change) -> None:
+    def _finish(self, change: Change) -> None:
         self._change = None
         pitch, roll = self._body.lean()
         if change.release:
@@ -223,12 +274,6 @@ class Motion:
         if name not in self._postures:
             raise Refused(f"cannot take posture {name!r}: known are {', '.join(self._postures)}")
         return self._postures[name]
-
-    def _upright(self, theta: float, pitch: float) -> Quaternion:
-        bullet = self._bullet
-        turn, lean = bullet.getQuaternionFromEuler((0, 0, theta)), bullet.getQuaternionFromEuler((0, pitch, 0))
-        orientation: Quaternion = bullet.multiplyTransforms((0, 0, 0), turn, (0, 0, 0), lean)[1]
-        return orientation
 
 
 def _check(names: Sequence[str], *values: Sequence[object]) -> None:

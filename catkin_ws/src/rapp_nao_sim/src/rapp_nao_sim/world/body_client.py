@@ -1,0 +1,146 @@
+"""Commands to the robot's body in the physics process, and what is asked of it."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from rapp_nao_sim.world.errors import Refused
+from rapp_nao_sim.world.worker import Worker
+
+MOVE_TIMEOUT = 30.0  # s, more than any movement at full speed takes, with its planning
+WALK_PATIENCE = 100.0  # s per m or rad of a way; the walk itself gives up before
+
+
+class BodyClient:
+    """The body; m, rad, s, in the room's frame. Every call is bounded, and raises Refused or Unreachable."""
+
+    def __init__(self, physics: Worker) -> None:
+        self._physics = physics
+
+    def robot_pose(self) -> tuple[float, float, float]:
+        """x and y of the middle of the soles, and the heading."""
+        return self._tuple("robot_pose")
+
+    def velocity(self) -> tuple[float, float, float]:
+        """Ahead, to the left and turning; of the step under way, or of the torso when it does not walk."""
+        return self._tuple("velocity")
+
+    def joint_angles(self, names: Sequence[str]) -> list[float]:
+        """What the joints' sensors read."""
+        return self._list("joint_angles", names)
+
+    def commanded_angles(self, names: Sequence[str]) -> list[float]:
+        """Where the motors are told to be now."""
+        return self._list("commanded_angles", names)
+
+    def stiffnesses(self, names: Sequence[str]) -> list[float]:
+        """Shares of the motors' torque, 0 to 1."""
+        return self._list("stiffnesses", names)
+
+    def set_stiffness(self, names: Sequence[str], values: Sequence[float]) -> None:
+        """Set shares of the motors' torque, 0 to 1."""
+        self._physics.call("set_stiffness", list(names), list(values))
+
+    def set_joints(self, names: Sequence[str], angles: Sequence[float], fraction: float) -> None:
+        """Send joints to angles at a fraction of their greatest speed; does not wait. Angles beyond a range become its end."""
+        self._physics.call("set_joints", list(names), list(angles), fraction)
+
+    def move_joints(self, names: Sequence[str], angles: Sequence[Sequence[float]], times: Sequence[Sequence[float]]) -> bool:
+        """Send each joint through its angles at its times, and wait; false when something stopped it."""
+        longest = max((max(when, default=0.0) for when in times), default=0.0)
+        args = list(names), [list(way) for way in angles], [list(when) for when in times]
+        return bool(self._physics.call("move_joints", *args, timeout=MOVE_TIMEOUT + longest))
+
+    def set_posture(self, name: str, speed: float) -> bool:
+        """Take a posture at a speed from 0 to 1, and wait; gives whether it is reached."""
+        if not 0 < speed <= 1:
+            raise Refused(f"cannot take a posture at speed {speed:g}; give more than 0 and at most 1")
+        return bool(self._physics.call("set_posture", name, speed, timeout=MOVE_TIMEOUT / speed))
+
+    def posture(self) -> tuple[str, str]:
+        """Name ("Unknown" in between) and family of the posture the body is in."""
+        name, family = self._physics.call("posture")
+        return str(name), str(family)
+
+    def wake_up(self) -> bool:
+        """Stiffen the joints and stand up, and wait; gives whether it stands."""
+        return bool(self._physics.call("wake_up", timeout=MOVE_TIMEOUT))
+
+    def rest(self) -> bool:
+        """Crouch, remove the stiffness, and wait; false when something stopped it."""
+        return bool(self._physics.call("rest", timeout=MOVE_TIMEOUT))
+
+    def walk_to(self, points: Sequence[Sequence[float]], share: float, lift: float) -> bool:
+        """Walk to poses (x, y, theta) seen from where the robot is, one after another, at a share of full speed, lifting the feet
+        by `lift`; waits, and gives whether it arrived.
+        """
+        poses = [list(point) for point in points]
+        timeout = MOVE_TIMEOUT + WALK_PATIENCE * sum(abs(part) for pose in poses for part in pose) / share
+        return bool(self._physics.call("walk_to", poses, share, lift, timeout=timeout))
+
+    def walk_at(self, velocity: Sequence[float], share: float, lift: float) -> None:
+        """Walk at a velocity (m/s ahead and to the left, rad/s) until told otherwise."""
+        self._physics.call("walk_at", list(velocity), share, lift)
+
+    def walking(self) -> bool:
+        """Whether the robot walks."""
+        return bool(self._physics.call("walking"))
+
+    def wait_for_walk(self, seconds: float) -> None:
+        """Wait until the robot does not walk any more."""
+        self._physics.call("wait_for_walk", timeout=seconds)
+
+    def stop_walk(self) -> None:
+        """Come to stand at once."""
+        self._physics.call("stop_walk")
+
+    def swing_arms(self, left: bool, right: bool) -> None:
+        """Whether the arms swing in walks."""
+        self._physics.call("swing_arms", left, right)
+
+    def odometry(self, use_sensors: bool = True) -> tuple[float, float, float]:
+        """Where the robot believes to be by its legs' sensors or commands, in the frame where it was first."""
+        return self._tuple("odometry" if use_sensors else "planned_pose")
+
+    def next_pose(self) -> tuple[float, float, float]:
+        """Where it believes to be after its present step."""
+        return self._tuple("next_pose")
+
+    def stop_joints(self, names: Sequence[str]) -> None:
+        """End the movement of joints; who waits for it hears false."""
+        self._physics.call("stop_joints", list(names))
+
+    def busy(self, names: Sequence[str]) -> bool:
+        """Whether a command moves any of these joints."""
+        return bool(self._physics.call("busy", list(names)))
+
+    def stop_posture(self) -> None:
+        """End a change of posture; who waits for it hears false."""
+        self._physics.call("stop_posture")
+
+    def stop(self) -> None:
+        """End all movement; who waits for it hears false."""
+        self._physics.call("stop")
+
+    def is_moving(self) -> bool:
+        """Whether a command is under way."""
+        return bool(self._physics.call("is_moving"))
+
+    def awake(self) -> bool:
+        """Whether the legs have stiffness."""
+        return bool(self._physics.call("awake"))
+
+    def fallen(self) -> bool:
+        """Whether the robot lies without having been told to."""
+        return bool(self._physics.call("fallen"))
+
+    def push(self, force: Sequence[float], seconds: float = 0.1) -> None:
+        """Push the torso with a force in N along the room's axes."""
+        self._physics.call("push", list(force), seconds)
+
+    def _tuple(self, verb: str) -> tuple[float, float, float]:
+        x, y, turn = self._physics.call(verb)
+        return float(x), float(y), float(turn)
+
+    def _list(self, verb: str, names: Sequence[str]) -> list[float]:
+        values: Any = self._physics.call(verb, list(names))
+        return [float(value) for value in values]
