@@ -117,9 +117,10 @@ class FakeMotion:
         self._body.note("relax")
         return self._begin(0.5, lambda: setattr(self, "awake", False))
 
-    def release(self) -> None:
+    def release(self) -> FakeMovement:
         self._body.note("rest")
         self.at, self.awake = "Crouch", False
+        return self._begin(POSTURE_TIME, lambda: None)
 
     def stop(self) -> None:
         self._body.note("stop motion")
@@ -198,7 +199,7 @@ class FakeCamera:
         self._body.note(f"capture {camera} {resolution}")
         width, height = SIZES[resolution]
         pixel = bytes([self.values[camera, 0], 0, 200 if camera == "bottom" else 0])
-        return Picture(width, height, pixel * (width * height), self._body.clock.time)
+        return Picture(width, height, pixel * (width * height), self._body.clock.time, camera)
 
     def set_parameter(self, camera: str, parameter: int, value: int) -> None:
         least, most = PARAMETERS.get(parameter, (1, 0))

@@ -1,9 +1,10 @@
-"""All that a RApp imports on the robot: communication, cloud, DynamicAgent and FSMs; `testing` is a core agent for the desk."""
+"""All that a RApp imports on the robot: what the robot and the cloud can do, DynamicAgent, FSMs; `testing` is for the desk."""
 
 from rapp_agent import Behaviour, Edge, Machine, Subsystem
-from rapp_api import cloud, communication
+from rapp_api import cloud, communication, navigation, vision
 from rapp_api.dynamic_agent import DynamicAgent
 from rapp_api.errors import Bug, Invalid, RappError, Refused, Unreachable
+from rapp_api.poses import Pose
 
 __all__ = [
     "Behaviour",
@@ -12,10 +13,13 @@ __all__ = [
     "Edge",
     "Invalid",
     "Machine",
+    "Pose",
     "RappError",
     "Refused",
     "Subsystem",
     "Unreachable",
     "cloud",
     "communication",
+    "navigation",
+    "vision",
 ]

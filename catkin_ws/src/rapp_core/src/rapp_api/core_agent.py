@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import Any, Protocol
 
 from rapp_api.errors import Bug
+from rapp_api.poses import Pose
 
 
 class CoreAgent(Protocol):
@@ -25,6 +26,51 @@ class CoreAgent(Protocol):
 
     def play_audio(self, path: str, position: float, volume: float, balance: float, loop: bool) -> None:
         """Play a file."""
+
+    def move_to(self, x: float, y: float, theta: float) -> None:
+        """Walk to a pose in the frame of the start, m, m, rad."""
+
+    def move_vel(self, x: float, y: float, theta: float) -> None:
+        """Begin to walk with a velocity, m/s, m/s, rad/s."""
+
+    def move_stop(self) -> None:
+        """Stop all motion."""
+
+    def move_joint(self, joints: Sequence[str], angles: Sequence[float], speed: float) -> None:
+        """Move joints to angles, rad; `speed` is a share, 0 for the core agent's own."""
+
+    def take_posture(self, posture: str, speed: float) -> None:
+        """Take a posture; `speed` is a share, 0 for the core agent's own."""
+
+    def look_at_point(self, x: float, y: float, z: float) -> None:
+        """Look at a point in base_link, m."""
+
+    def rest(self, posture: str) -> None:
+        """Rest in a posture; "" for the core agent's own."""
+
+    def move_along_path(self, path: Sequence[Pose]) -> None:
+        """Walk along poses."""
+
+    def set_global_pose(self, pose: Pose) -> None:
+        """Tell where the robot is in the map."""
+
+    def get_robot_pose(self) -> Pose:
+        """Where the robot is in the map."""
+
+    def get_transform(self, name: str, space: int) -> Sequence[float]:
+        """The matrix of a part in a space (0 torso, 1 world, 2 robot), row by row."""
+
+    def capture_image(self, camera: str, resolution: int) -> tuple[int, int, bytes]:
+        """Width, height and BGR data of a picture."""
+
+    def set_camera_param(self, camera: int, parameter: int, value: int) -> None:
+        """Set a parameter of a camera."""
+
+    def set_camera_params(self, camera: int, parameters: Sequence[int], values: Sequence[int]) -> list[bool]:
+        """Set parameters of a camera; whether each was taken."""
+
+    def action_client(self, name: str) -> Any:
+        """A client of the action of that name, as actionlib.SimpleActionClient."""
 
     def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float) -> Any:
         """Call a HOP service of the repository agent; gives its JSON result."""

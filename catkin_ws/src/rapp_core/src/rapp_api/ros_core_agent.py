@@ -16,13 +16,14 @@ from rospy.exceptions import ROSInternalException
 
 from rapp_api.core_agent import activity
 from rapp_api.errors import KINDS, Invalid, Refused, Unreachable
+from rapp_api.ros_body import RosBody
 
 CONNECT_TIMEOUT = 5.0  # s for the service to appear at the ROS master
 ANSWER_TIMEOUT = 3600.0  # s; longer than any service takes: recording and listening end after 300 s
 PAUSE_STEP = 0.2  # s
 
 
-class RosCoreAgent:
+class RosCoreAgent(RosBody):
     """See `core_agent.CoreAgent`. The secret came over this process's own channel: no other process can use it."""
 
     def __init__(self, token: str, answer_timeout: float = ANSWER_TIMEOUT) -> None:
@@ -73,7 +74,7 @@ class RosCoreAgent:
             time.sleep(min(left, PAUSE_STEP))
             activity.moved()
 
-    def _call(self, name: str, srv: str, **fields: Any) -> Any:
+    def _call(self, name: str, srv: str, /, **fields: Any) -> Any:
         with _translated(name), activity.waiting():
             response = self._answer(name, getattr(rapp_msgs.srv, srv), fields)
         if not response.success:

@@ -13,17 +13,19 @@ from typing import Any
 
 from rapp_api.core_agent import use
 from rapp_api.errors import Invalid, RappError, Refused
+from rapp_api.fake_body import FakeBody, Image
 
 Service = Any | Callable[[dict[str, Any]], Any]
 RECORDINGS = "/recordings"
 
 
-class FakeCoreAgent:
+class FakeCoreAgent(FakeBody):
     """Implements `CoreAgent` in memory, with the real one's limits, and notes every call in `calls` as (name, argument).
 
     `hears` are the words the person says, one for each time the robot listens ("" for silence); `services` gives for each HOP
     service its result, a function of its arguments, or the RappError it ends with; `mail` is "delivered", "kept", "locked" or a
-    RappError; with `package`, the folder of the RApp, calls that its package.json does not name are refused.
+    RappError; `pictures` are what the cameras see, one after another; `walks` says how each walk ends (None: well); with `package`,
+    the folder of the RApp, calls that its package.json does not name are refused.
     """
 
     def __init__(
@@ -32,7 +34,10 @@ class FakeCoreAgent:
         services: Mapping[str, Service] | None = None,
         mail: str | RappError = "delivered",
         package: Path | None = None,
+        pictures: Sequence[Image] = (),
+        walks: Sequence[RappError | None] = (),
     ) -> None:
+        super().__init__(pictures, walks)
         self.calls: list[tuple[str, Any]] = []
         self.mails: list[dict[str, Any]] = []
         self.recordings: list[str] = []
@@ -134,6 +139,9 @@ class FakeCoreAgent:
     def pause(self, seconds: float) -> None:
         """Note it; no time passes."""
         self.calls.append(("pause", seconds))
+
+    def _permit(self, name: str) -> None:
+        self._allow(name, self._core)
 
     @staticmethod
     def _allow(name: str, permitted: frozenset[str] | None) -> None:

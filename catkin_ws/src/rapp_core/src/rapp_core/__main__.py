@@ -21,6 +21,7 @@ from rapp_core.ports import Voice
 from rapp_core.robot.naoqi import robot, subscriber
 from rapp_core.robot.naoqi.connection import Connection
 from rapp_core.robot.naoqi.guard import Guard
+from rapp_core.ros.actions import RosActions
 from rapp_core.ros.hop import RosHop
 from rapp_core.ros.node import join, leave, log_to_stderr
 from rapp_core.ros.services import RosServices
@@ -72,6 +73,7 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     platform = Platform(hop, config)
     control = Control(Parts(nao, hop, launcher, executor, platform, lease, trace, config, stop))
     RosServices(executor, Outside(hop, config, stop), lease, trace)
+    RosActions(executor, lease, trace)
     machine, rejoining = core_machine(control), Rejoining()
     machine.listen(trace.core_event)
     threading.Thread(target=_hush_at_end, args=(nao.voice, stop), name="hush", daemon=True).start()

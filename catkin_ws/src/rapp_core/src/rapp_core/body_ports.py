@@ -34,6 +34,7 @@ class Picture:
     height: int
     data: bytes
     stamp: float  # s since the epoch
+    camera: str = "top"  # that took it
 
 
 @dataclass(frozen=True)
@@ -88,8 +89,8 @@ class Motion(Protocol):
     def relax(self) -> Movement:
         """Switch the motors off."""
 
-    def release(self) -> None:
-        """Let the robot rest: a safe posture, then the motors off; goes on by itself when that takes longer than a moment."""
+    def release(self) -> Movement:
+        """Let the robot rest: a safe posture, then the motors off."""
 
     def stop(self) -> None:
         """Stop all motion now; never waits for a motion under way."""

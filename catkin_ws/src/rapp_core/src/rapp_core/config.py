@@ -52,6 +52,16 @@ class Config:
     cloud_call_timeout: float = 30.0  # s for a dynamic agent's cloud call unless told otherwise
     mail_timeout: float = 60.0  # s
     link_back: float = 15.0  # s from a mail's first try in which a link that is away may come back and take it
+    walk_speed: float = 0.1  # m/s ahead or back that a RApp may ask for
+    side_speed: float = 0.06  # m/s to a side
+    turn_speed: float = 0.5  # rad/s
+    walk_distance: float = 10.0  # m of one walk or path
+    walk_error: float = 0.15  # m beside its goal at which a walk has failed
+    turn_error: float = 0.3  # rad
+    near: float = 0.3  # m; an obstacle nearer than this stops a robot that walks towards it
+    motion_time: float = 180.0  # s of one motion
+    posture_speed: float = 0.6  # share of the greatest speed, of postures unless told otherwise
+    joint_speed: float = 0.3  # share of the greatest speed, of joints unless told otherwise
     warm_up: float = 20.0  # s for a spare to import rospy and join ROS
     first_word: float = 15.0  # s from activation to the dynamic agent's first word
     heartbeat: float = 1.0  # s without a heartbeat after which the lease is silent

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rapp_agent import Subsystem
+from rapp_core.body_ports import Movement
 from rapp_core.config import Config
 from rapp_core.control.listening import Listener
 from rapp_core.control.platform import Platform
@@ -23,6 +24,7 @@ from rapp_core.trace import Happening, Trace
 _log = logging.getLogger(__name__)
 STEP = 0.05  # s between two looks at the dynamic agent
 HURRIED = 0.2  # s for a dynamic agent that did not end by itself to stop what it has started
+RESTING = 1.0  # s in which the robot is seen to begin to rest before the core agent leaves it
 RETRY = 1.0  # s between tries to reach the robot
 DYNAMIC_KINDS = ("entered", "left", "failed")
 
@@ -206,6 +208,8 @@ class Control:
             run.dismantle(parts.config.dismantle if run.outcome is not None else HURRIED, parts.stop)
         parts.lease.release()
         self._still()
+        if parts.executor.take_moved():
+            self._let_rest()
         self._end_run()
         parts.launcher.prepare()
 
@@ -247,11 +251,21 @@ class Control:
         reached = self._still()
         if self._run is not None:
             self._end_run()
-        if reached:
-            try:
-                self._parts.robot.motion.release()
-            except CoreError as error:
-                _log.info("%s", error)
+        resting = self._let_rest() if reached else None
+        if resting is not None:
+            resting.wait(RESTING)
+
+    def _let_rest(self) -> Movement | None:
+        """Release what the RApp has used of the body; the robot goes on by itself, and is not waited for."""
+        robot = self._parts.robot
+        try:
+            return robot.motion.release()
+        except CoreError as error:
+            _log.warning("%s", error)
+            return None
+        finally:
+            robot.camera.close()
+            robot.feeling.close()
 
     def _present(self) -> Agent:
         assert self._run is not None

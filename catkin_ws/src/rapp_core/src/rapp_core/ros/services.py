@@ -9,6 +9,7 @@ import rospy
 
 from rapp_core.errors import CoreError, Refused
 from rapp_core.launcher.lease import Grant, Lease
+from rapp_core.ros.conversions import fields, fill
 from rapp_core.services.executor import Executor
 from rapp_core.services.outside import Outside
 from rapp_core.services.table import CORE_SERVICES, CoreService
@@ -40,16 +41,16 @@ class RosServices:
             try:
                 grant = self._lease.check(request._connection_header.get("rapp_channel"))
             except Refused as error:
-                return _failed(name, response, error)
+                return fail(name, response, error)
             self._trace.call("dynamic", "core", name)
             reply = name
             try:
                 with self._executor.counted():
-                    _allow(grant, name)
+                    allow(grant, name)
                     handler(grant, request, response)
                 response.success = True
             except CoreError as error:
-                _failed(name, response, error)
+                fail(name, response, error)
                 reply = f"{name}: {error.kind}"
             self._trace.reply("core", "dynamic", reply)
             return response
@@ -58,9 +59,7 @@ class RosServices:
 
     def _core(self, row: CoreService) -> Handler:
         def execute(grant: Grant, request: Any, response: Any) -> None:
-            fields = {name: getattr(request, name) for name in request.__slots__ if not name.startswith("_")}
-            for name, value in self._executor.run_for(grant, row.name, **fields).items():
-                setattr(response, name, value)
+            fill(response, self._executor.run_for(grant, row.name, **fields(request)))
 
         return execute
 
@@ -71,15 +70,15 @@ class RosServices:
         response.state = self._outside.send_mail(grant.run, request.recipients, request.subject, request.body, request.attachment)
 
 
-def _allow(grant: Grant, name: str) -> None:
+def allow(grant: Grant, name: str) -> None:
+    """Raise Refused when the RApp has not said that it uses a service."""
     manifest = grant.run.manifest
     if name not in OUTSIDE and (manifest is None or name not in manifest.core):
         raise Refused(f"cannot call {name}: the RApp's package.json does not name it under permissions.core")
 
 
-def _failed(name: str, response: Any, error: CoreError) -> Any:
+def fail(name: str, message: Any, error: CoreError) -> Any:
+    """Tell in a response or a result what went wrong; gives the message."""
     _log.warning("%s: %s", name, error)
-    response.message = str(error)
-    if hasattr(response, "error"):
-        response.error = error.kind
-    return response
+    message.message, message.error = str(error), error.kind
+    return message

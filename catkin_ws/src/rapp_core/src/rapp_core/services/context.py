@@ -11,6 +11,8 @@ from rapp_agent import Buffer, Machine, Subsystem
 from rapp_core.config import Config
 from rapp_core.errors import CoreError, Invalid, Refused
 from rapp_core.ports import INSIDE_PACKAGE, Robot
+from rapp_core.services.calls import Call, Calls
+from rapp_core.services.place import Place
 from rapp_core.trace import Trace
 
 STEP = 0.02  # s between steps of a service that waits
@@ -18,7 +20,7 @@ STEP = 0.02  # s between steps of a service that waits
 
 @dataclass(frozen=True)
 class Context:
-    """What all services share, and what belongs to the caller of one: `cut`, which ends the service when set, and folders."""
+    """What all services share, and what belongs to the caller of one: its folders, and `cut` and `call`, which end the service."""
 
     robot: Robot
     config: Config
@@ -27,6 +29,15 @@ class Context:
     package: Path | None = None  # the caller's package, which it sees as `INSIDE_PACKAGE`
     cut: threading.Event = field(default_factory=threading.Event)
     now: Callable[[], float] = time.monotonic
+    call: Call = field(default_factory=Call)
+    calls: Calls = field(default_factory=Calls)  # of all callers
+    place: Place = field(default_factory=Place)  # of the robot
+
+    def check(self) -> None:
+        """Raise Refused when the service is to end."""
+        if self.cut.is_set():
+            raise Refused("cannot finish: the dynamic agent's lease has ended")
+        self.call.check()
 
     def readable(self, seen: str) -> Path:
         """The file behind a path as the caller sees it: of its package or its recordings. Raises Invalid for any other."""
@@ -44,7 +55,7 @@ class Reply(dict[str, Any]):
     """Fields of a service's response."""
 
 
-def subsystem(name: str, **request: Any) -> Subsystem:
+def subsystem(name: str, /, **request: Any) -> Subsystem:
     """The control subsystem's share of one service call: an input buffer for what is heard, the request in memory."""
     return Subsystem(name, inputs=[Buffer("heard", 256)], memory={"request": request, "reply": Reply()})
 
@@ -54,8 +65,9 @@ def execute(machine: Machine, share: Subsystem, context: Context) -> Reply:
     stop = machine.listen(context.trace.service_event)
     try:
         while not machine.step(share):
-            if context.cut.wait(STEP):
-                raise Refused("cannot finish: the dynamic agent's lease has ended")
+            wait = share.memory.get("wait")  # for what may end sooner than a step does, such as a motion
+            (wait if callable(wait) else context.cut.wait)(STEP)
+            context.check()
     finally:
         stop()
         undo = share.memory.get("undo")

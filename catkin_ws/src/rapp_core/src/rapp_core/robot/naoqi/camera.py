@@ -33,7 +33,7 @@ class NaoqiCamera:
             for _ in range(TRIES):
                 image = self._image(CAMERAS[camera], resolution)
                 if image is not None:
-                    return _picture(image)
+                    return _picture(image, camera)
         raise Unreachable(f"cannot take a picture: the {camera} camera gives none; try again")
 
     def set_parameter(self, camera: str, parameter: int, value: int) -> None:
@@ -81,10 +81,10 @@ class NaoqiCamera:
         return self._handles[key]
 
 
-def _picture(image: Any) -> Picture:
+def _picture(image: Any, camera: str) -> Picture:
     """NAOqi's list: width, height, layers, colour space, s, us, data; old clients see the data as text."""
     width, height, data = int(image[0]), int(image[1]), image[6]
     whole = data.encode("latin-1") if isinstance(data, str) else bytes(data)
     if len(whole) != width * height * LAYERS:
         raise Unreachable(f"cannot take a picture: {len(whole)} bytes came for {width} x {height} pixels; try again")
-    return Picture(width, height, whole, float(image[4]) + float(image[5]) * 1e-6)
+    return Picture(width, height, whole, float(image[4]) + float(image[5]) * 1e-6, camera)

@@ -11,7 +11,6 @@ from rapp_core.robot.naoqi.connection import Connection
 from rapp_core.robot.naoqi.gaze import gaze
 from rapp_core.robot.naoqi.movement import NaoqiMovement, Walking
 
-MOMENT = 1.0  # s that are waited for the robot to rest; it goes on sitting down when nobody waits
 FADE = 0.5  # s in which the motors are switched off
 ROBOT_SPACE = 2
 STANDING = "Standing"  # NAOqi's family of postures on straight or bent legs
@@ -27,7 +26,7 @@ class NaoqiMotion:
         self._connection = connection
         self._lock = threading.Lock()
         self._open: list[tuple[NaoqiMovement, tuple[str, ...]]] = []  # motions begun here, and their joints if not all
-        self._resting: Any = None  # libqi's future of the last release
+        self._resting: Movement | None = None  # the last release
         self._limits: dict[str, JointLimits] = {}
 
     def move_to(self, x: float, y: float, theta: float) -> Movement:
@@ -65,10 +64,10 @@ class NaoqiMotion:
         """See `body_ports.Motion`."""
         return self._begin("ALMotion", "stiffnessInterpolation", "Body", 0.0, FADE)
 
-    def release(self) -> None:
+    def release(self) -> Movement:
         """See `body_ports.Motion`."""
-        self._resting = self._connection.start("ALMotion", "rest")
-        self._resting.wait(round(MOMENT * 1000))
+        self._resting = self._begin("ALMotion", "rest")
+        return self._resting
 
     def stop(self) -> None:
         """See `body_ports.Motion`. All is asked for at once; joints that move by themselves are stopped by their names."""
@@ -93,7 +92,7 @@ class NaoqiMotion:
 
     def standing(self) -> bool:
         """See `body_ports.Motion`; a robot that is about to rest does not stand any more."""
-        if self._resting is not None and not self._resting.isFinished():
+        if self._resting is not None and not self._resting.done():
             return False
         family = self._connection.start("ALRobotPosture", "getPostureFamily")
         awake = bool(self._connection.call("ALMotion", "robotIsWakeUp"))

@@ -1,0 +1,82 @@
+"""The calls that move the robot, or wait for the limbs they move: each can be ended from outside, all by one word."""
+
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from rapp_core.errors import Refused
+
+LIMBS = frozenset({"legs", "arms", "head"})
+"""Resources of the body that move."""
+
+
+class Call:
+    """One call of a service."""
+
+    def __init__(self, feedback: Callable[[Mapping[str, Any]], None] | None = None) -> None:
+        """`feedback` is told how far the call is, from the thread that executes it."""
+        self.feedback = feedback
+        self.yields = False
+        """Whether it gives way to the next call that wants one of its limbs."""
+        self._reason: str | None = None
+
+    def end(self, reason: str) -> None:
+        """End the call, which its caller is told as refused for this reason; the first one counts."""
+        if self._reason is None:
+            self._reason = reason
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has been ended."""
+        return self._reason is not None
+
+    def check(self) -> None:
+        """Raise Refused when the call has been ended."""
+        if self._reason is not None:
+            raise Refused(f"cannot finish: {self._reason}")
+
+
+class Calls:
+    """All calls that move the robot at this moment, and whether any has since the last `take_moved`."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._open: list[tuple[Call, frozenset[str]]] = []
+        self._moved = False
+
+    @contextmanager
+    def entered(self, call: Call, limbs: Sequence[str]) -> Iterator[None]:
+        """While the call moves limbs, or waits for them."""
+        entry = (call, frozenset(limbs))
+        with self._lock:
+            self._open.append(entry)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._open.remove(entry)
+
+    def end(self, reason: str) -> None:
+        """End all calls."""
+        for call, _limbs in self._now():
+            call.end(reason)
+
+    def make_way(self, newcomer: Call, limb: str, everyone: bool, reason: str) -> None:
+        """End the calls that have a limb which a newcomer wants: those that yield, or `everyone`."""
+        for call, taken in self._now():
+            if (call.yields or everyone) and limb in taken and call is not newcomer:
+                call.end(reason)
+
+    def note_moved(self) -> None:
+        """The robot is made to move."""
+        self._moved = True
+
+    def take_moved(self) -> bool:
+        """Whether the robot was made to move since this was asked the last time."""
+        moved, self._moved = self._moved, False
+        return moved
+
+    def _now(self) -> list[tuple[Call, frozenset[str]]]:
+        with self._lock:
+            return list(self._open)

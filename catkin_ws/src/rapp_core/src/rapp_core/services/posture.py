@@ -1,0 +1,70 @@
+"""rapp_take_posture and rapp_rest: takePredefinedPosture and rest of the deliverable (section 4.5.2)."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rapp_agent import Behaviour, Edge, Machine, Subsystem
+from rapp_core.body_ports import Movement
+from rapp_core.errors import Invalid
+from rapp_core.services.context import Context, request
+from rapp_core.services.joints import share_of_speed
+from rapp_core.services.moving import motion
+
+RESTING = ("Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
+
+
+def machine(context: Context) -> Machine:
+    """Sub-FSM: check, take the posture."""
+    robot = context.robot.motion
+
+    def check(share: Subsystem) -> None:
+        known = robot.postures()
+        if request(share, "posture") not in known:
+            raise Invalid(f"cannot take posture {request(share, 'posture')!r}: known are {', '.join(known)}")
+        share.memory["speed"] = share_of_speed(float(request(share, "speed")), context.config.posture_speed)
+
+    def take(share: Subsystem) -> Movement:
+        context.trace.call("core", "ALRobotPosture", "goToPosture")
+        return robot.take_posture(request(share, "posture"), float(str(share.memory["speed"])))
+
+    def now(_share: Subsystem) -> Mapping[str, Any]:
+        return {"posture": robot.posture()}
+
+    return Machine(
+        "rapp_take_posture",
+        {
+            "check": Behaviour("check", check, label="check"),
+            "take": motion(context, "take", take, "goToPosture", feedback=now),
+        },
+        "check",
+        [Edge("check", "take")],
+        ["take"],
+    )
+
+
+def rest_machine(context: Context) -> Machine:
+    """Sub-FSM: check, take the resting posture, switch the motors off."""
+
+    def check(share: Subsystem) -> None:
+        if (request(share, "posture") or RESTING[0]) not in RESTING:
+            raise Invalid(f"cannot rest in posture {request(share, 'posture')!r}: known are {', '.join(RESTING)}")
+
+    def take(share: Subsystem) -> Movement:
+        context.trace.call("core", "ALRobotPosture", "goToPosture")
+        return context.robot.motion.take_posture(request(share, "posture") or RESTING[0], context.config.posture_speed)
+
+    def relax(_share: Subsystem) -> Movement:
+        context.trace.call("core", "ALMotion", "stiffnessInterpolation")
+        return context.robot.motion.relax()
+
+    return Machine(
+        "rapp_rest",
+        {
+            "check": Behaviour("check", check, label="check"),
+            "take": motion(context, "take", take, "goToPosture"),
+            "relax": motion(context, "relax", relax, "stiffnessInterpolation"),
+        },
+        "check",
+        [Edge("check", "take"), Edge("take", "relax")],
+        ["relax"],
+    )

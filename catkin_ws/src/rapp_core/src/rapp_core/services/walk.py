@@ -1,0 +1,181 @@
+"""rapp_move_to and rapp_move_along_path: moveTo and moveAlongPath of the deliverable (section 4.5.2)."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rapp_agent import Behaviour, Edge, Machine, Subsystem
+from rapp_core.body_ports import Movement, Pose2D
+from rapp_core.errors import Invalid, Refused
+from rapp_core.geometry import finite, relative, turned
+from rapp_core.services.context import Context, request
+from rapp_core.services.moving import FEELING, Every, motion, refuse_hazard, standing_up
+from rapp_core.services.place import FRAMES, Waypoint
+
+MOST = 100  # poses of a path
+TURN_FIRST = math.radians(20)  # rad to the side of a pose above which the robot turns before it walks there
+THERE = 0.1  # m from a pose within which it is not turned to
+
+
+class _Walk:
+    """Legs of a walk, one after another; start, goals and poses are in odom."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._motion = context.robot.motion
+        self._feeling = Every(context, FEELING)
+        self._start = self._pose = self._goal = Pose2D(0.0, 0.0, 0.0)
+        self._goals: list[Pose2D] = []
+        self._reached = 0
+
+    def plan(self, waypoints: Sequence[Waypoint]) -> None:
+        """Where to walk, from where the robot is. Raises Invalid, Refused."""
+        context, start = self._context, self._motion.pose()
+        self._start = self._pose = start
+        self._goals = [context.place.in_odom(waypoint, start) for waypoint in waypoints]
+        length = sum(math.dist((a.x, a.y), (b.x, b.y)) for a, b in itertools.pairwise([start, *self._goals]))
+        if length > context.config.walk_distance:
+            most = f"{context.config.walk_distance:g} m at a time are allowed; walk in parts"
+            raise Refused(f"cannot walk {length:.1f} m: {most}")
+        self._goal = self._goals[0]
+        way = self.left()
+        refuse_hazard(context, Pose2D(0.0, 0.0, 0.0) if self._askew(way) else way)
+
+    def left(self) -> Pose2D:
+        """What is left of the way to the present goal, in base_link."""
+        return relative(self._pose, self._goal)
+
+    def stands(self, _share: Subsystem) -> bool:
+        """Whether the robot can walk as it is."""
+        return self._motion.standing()
+
+    def next(self, _share: Subsystem) -> None:
+        """Turn to the next goal."""
+        self._pose, self._goal = self._motion.pose(), self._goals[self._reached]
+
+    def askew(self, _share: Subsystem) -> bool:
+        """Whether the robot has to turn before it walks on."""
+        return self._askew(self.left())
+
+    @staticmethod
+    def _askew(way: Pose2D) -> bool:
+        return math.hypot(way.x, way.y) > THERE and abs(math.atan2(way.y, way.x)) > TURN_FIRST
+
+    def turn(self, _share: Subsystem) -> Movement:
+        """Turn towards the goal."""
+        way = self.left()
+        return self._walk(Pose2D(0.0, 0.0, math.atan2(way.y, way.x)))
+
+    def walk(self, _share: Subsystem) -> Movement:
+        """Walk to the goal."""
+        self._pose = self._motion.pose()
+        return self._walk(self.left())
+
+    def _walk(self, way: Pose2D) -> Movement:
+        self._context.trace.call("core", "ALMotion", "moveTo")
+        return self._motion.move_to(way.x, way.y, way.theta)
+
+    def watch(self, _share: Subsystem) -> None:
+        """The robot's reflexes on its way to the goal."""
+        if self._feeling.due():
+            self._pose = self._motion.pose()
+            refuse_hazard(self._context, self.left())
+
+    def watch_turning(self, _share: Subsystem) -> None:
+        """The robot's reflexes while it turns."""
+        if self._feeling.due():
+            self._pose = self._motion.pose()
+            refuse_hazard(self._context, Pose2D(0.0, 0.0, 0.0))
+
+    def arrive(self, _share: Subsystem) -> None:
+        """Judge where the robot has come to. Raises Refused."""
+        self._context.trace.reply("ALMotion", "core", "moveTo")
+        config = self._context.config
+        self._pose = self._motion.pose()
+        left = self.left()
+        distance = math.hypot(left.x, left.y)
+        if distance > config.walk_error or abs(left.theta) > config.turn_error:
+            off = f"{distance:.2f} m and {abs(left.theta):.2f} rad before the goal"
+            raise Refused(f"cannot get there: the robot has stopped {off}; see what is in its way, and try again")
+        self._reached += 1
+
+    def more(self, _share: Subsystem) -> bool:
+        """Whether there are goals left."""
+        return self._reached < len(self._goals)
+
+    def from_start(self, _share: Subsystem) -> Mapping[str, Any]:
+        """Feedback of rapp_move_to."""
+        now = relative(self._start, self._pose)
+        return {"x": now.x, "y": now.y, "theta": now.theta}
+
+    def on_path(self, _share: Subsystem) -> Mapping[str, Any]:
+        """Feedback of rapp_move_along_path."""
+        return {"reached": self._reached, "pose": self._context.place.in_map(self._pose)}
+
+
+def machine(context: Context) -> Machine:
+    """Sub-FSM: check, stand up if need be, walk, judge."""
+    do = _Walk(context)
+
+    def check(share: Subsystem) -> None:
+        x, y, theta = (float(request(share, name)) for name in ("x", "y", "theta"))
+        if not finite(x, y, theta):
+            raise Invalid("cannot walk there: x, y and theta must be numbers; m and rad")
+        # The way round is the same pose: NAOqi would turn on the spot for a theta of many turns.
+        do.plan([Waypoint("base_link", Pose2D(x, y, turned(theta)))])
+
+    return Machine(
+        "rapp_move_to",
+        {
+            "check": Behaviour("check", check, label="check"),
+            "stand": standing_up(context),
+            "walk": motion(context, "walk", do.walk, "moveTo", do.watch, do.from_start),
+            "arrived": Behaviour("arrived", do.arrive, label="judge"),
+        },
+        "check",
+        [Edge("check", "walk", do.stands, "stands"), Edge("check", "stand"), Edge("stand", "walk"), Edge("walk", "arrived")],
+        ["arrived"],
+    )
+
+
+def path_machine(context: Context) -> Machine:
+    """Sub-FSM: check, stand up if need be, then for each pose: turn towards it if need be, walk, judge."""
+    do = _Walk(context)
+
+    def check(share: Subsystem) -> None:
+        poses: Sequence[Waypoint] = request(share, "poses")
+        if not 1 <= len(poses) <= MOST:
+            raise Invalid(f"cannot walk along {len(poses)} poses: 1 to {MOST} are possible")
+        for number, waypoint in enumerate(poses, 1):
+            if waypoint.frame not in FRAMES:
+                raise Invalid(f"cannot use pose {number} in frame {waypoint.frame!r}: known are {', '.join(FRAMES)}")
+            if not finite(waypoint.pose.x, waypoint.pose.y, waypoint.pose.theta):
+                raise Invalid(f"cannot use pose {number}: its position and orientation must be numbers")
+        do.plan(poses)
+
+    return Machine(
+        "rapp_move_along_path",
+        {
+            "check": Behaviour("check", check, label="check"),
+            "stand": standing_up(context),
+            "next": Behaviour("next", do.next, label="next pose"),
+            "turn": motion(context, "turn", do.turn, "moveTo", do.watch_turning, do.on_path),
+            "walk": motion(context, "walk", do.walk, "moveTo", do.watch, do.on_path),
+            "judge": Behaviour("judge", do.arrive, label="judge"),
+            "arrived": Behaviour("arrived", lambda _share: None, label="arrived"),
+        },
+        "check",
+        [
+            Edge("check", "next", do.stands, "stands"),
+            Edge("check", "stand"),
+            Edge("stand", "next"),
+            Edge("next", "turn", do.askew, "looks elsewhere"),
+            Edge("next", "walk"),
+            Edge("turn", "walk"),
+            Edge("walk", "judge"),
+            Edge("judge", "next", do.more, "more poses"),
+            Edge("judge", "arrived"),
+        ],
+        ["arrived"],
+    )
