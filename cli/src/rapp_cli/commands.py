@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rapp_cli import bench, test
+from rapp_cli import bench, sim, test
 from rapp_cli.demo import command as demo
 from rapp_cli.home import down, listen, log, say, status, up
 from rapp_cli.trace import command as trace
@@ -29,6 +29,7 @@ COMMANDS = (
     Command("log", "show what the agents write, and follow it", log.add_options, log.run),
     Command("trace", "draw the last run as a UML sequence diagram", trace.add_options, trace.run),
     Command("down", "end them", down.add_options, down.run),
+    Command("sim", "simulate a NAO in its room, or photograph the room", sim.add_options, sim.run),
     Command("test", "check and test everything, as continuous integration does", test.add_options, test.run),
     Command("bench", "measure: " + ", ".join(bench.SUBJECTS), bench.add_options, bench.run),
 )

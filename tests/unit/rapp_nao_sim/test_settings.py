@@ -22,6 +22,8 @@ def test_every_option_reaches_the_settings(tmp_path):
     assert (config.address, config.microphone, config.voice, config.ambient) == ("127.0.0.2", "text", "silent", 200.0)
     assert [str(folder) for folder in config.files] == [str(tmp_path), "/tmp"]
     assert config.world is False
+    config = read(["--room", "hall.toml", "--gui"], {})
+    assert (str(config.room), config.gui, config.world) == ("hall.toml", True, True)
 
 
 @pytest.mark.parametrize(

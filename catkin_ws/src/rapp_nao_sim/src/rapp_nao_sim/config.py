@@ -22,6 +22,7 @@ class Config:
     echo: float = 0.03  # share of the robot's own voice that its microphone picks up
     world: bool = True  # whether there is a body in a room
     room: Path | None = None  # room file; None: our own
+    gui: bool = False  # whether a window shows the room
 
 
 def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
@@ -35,6 +36,7 @@ def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
     parser.add_argument("--files", type=Path, action="append", help="a folder where clients may write (repeatable)")
     parser.add_argument("--ambient", type=_level, default=default.ambient, help="noise floor, RMS of 16-bit samples")
     parser.add_argument("--room", type=Path, metavar="FILE", help="room file (default: our own)")
+    parser.add_argument("--gui", action="store_true", help="show the room in a window")
     parser.add_argument("--no-world", action="store_true", help="voice and ears only, no body in a room")
     options = parser.parse_args(words)
     return Config(
@@ -46,6 +48,7 @@ def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
         ambient=options.ambient,
         world=not options.no_world,
         room=options.room,
+        gui=options.gui,
     )
 
 

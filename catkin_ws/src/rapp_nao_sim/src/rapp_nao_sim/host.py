@@ -35,7 +35,7 @@ class Host:
         self._config = config
         self._undo = ExitStack()
         self._session = qi.Session()
-        self._world = WorldClient(WorldConfig(room=config.room)) if config.world else None
+        self._world = WorldClient(WorldConfig(room=config.room, window=config.gui)) if config.world else None
         self._ears = Ears() if config.microphone == "sound" else None
         self._mixer = Mixer(config.ambient)
         self._room = Room(self._mixer)

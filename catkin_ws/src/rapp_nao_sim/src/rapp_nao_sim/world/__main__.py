@@ -26,6 +26,7 @@ def main() -> int:
             if options.lamp is not None:
                 world.set_lamp(options.lamp)
             world.photograph(options.shot)
+            print(f"the room is photographed in {options.shot}")
     except WorldError as error:
         print(error, file=sys.stderr)
         return 1

@@ -9,13 +9,13 @@ from contextlib import contextmanager
 from typing import Any
 
 
-def connect() -> Any:
-    """pybullet bound to a new world of its own, without graphics; end it with `disconnect()`."""
+def connect(window: bool = False) -> Any:
+    """pybullet bound to a new world of its own, without graphics or in a window; end it with `disconnect()`."""
     with _silence(1), _silence(2):
         import pybullet
 
         client = importlib.import_module("pybullet_utils.bullet_client")  # without type information
-        return client.BulletClient(pybullet.DIRECT)
+        return client.BulletClient(pybullet.GUI if window else pybullet.DIRECT)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from typing import Any
 from rapp_nao_sim.world.body_client import BodyClient
 from rapp_nao_sim.world.cameras import Settings
 from rapp_nao_sim.world.errors import Refused
+from rapp_nao_sim.world.onlooker import Onlooker
 from rapp_nao_sim.world.room import Room
 from rapp_nao_sim.world.views import Shot, Views
 from rapp_nao_sim.world.worker import Worker
@@ -26,6 +27,7 @@ class WorldConfig:
     start_timeout: float = 30.0  # s, until the robot stands in its room
     width: int = 960  # pixels of photographs
     height: int = 720
+    window: bool = False  # whether a window shows the room, where there is a screen
 
 
 class WorldClient(BodyClient):
@@ -38,6 +40,7 @@ class WorldClient(BodyClient):
         self._config = config or WorldConfig()
         super().__init__(Worker("rapp_nao_sim.world.physics"))
         self._views = Views(lambda: self._physics.call("snapshot"), self._physics.alive)
+        self._onlooker = Onlooker(self._views.scenery)
 
     def start(self) -> None:
         """Start the physics process and wait until the robot is in its room; raises Invalid for a wrong room file."""
@@ -45,12 +48,15 @@ class WorldClient(BodyClient):
         self._physics.start()
         try:
             self._views.show(lambda: self._room("set_up", config.room, config.posture, config.pace))
+            if config.window:
+                self._onlooker.open()
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
         """End the processes and wait for them."""
+        self._onlooker.close()
         self._physics.close()  # first: a picture that fails by the renderer's end is not tried again then
         self._views.close()
 

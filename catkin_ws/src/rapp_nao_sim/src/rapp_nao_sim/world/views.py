@@ -39,6 +39,13 @@ class Views:
             self._room = prepare()
             self._renderer.close()
 
+    def scenery(self) -> tuple[Room, dict[str, Any]]:
+        """The room and what is where in it."""
+        with self._lock:
+            if self._room is None:
+                raise Unreachable("cannot look at the room: the world has not been started")
+            return self._room, self._look()
+
     def close(self) -> None:
         """End the renderer and wait for it."""
         self._renderer.close()
