@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 from rapp_nao_sim.naoqi import NaoqiError, working
 from rapp_nao_sim.world.errors import WorldError
+from rapp_nao_sim.world.frames import Stance
 
 Ways = Sequence[Sequence[float]]  # for each joint, its values one after another
 
@@ -32,6 +33,7 @@ class World(Protocol):
     def stop_walk(self) -> None: ...  # noqa: D102
     def swing_arms(self, left: bool, right: bool) -> None: ...  # noqa: D102
     def odometry(self, use_sensors: bool) -> tuple[float, float, float]: ...  # noqa: D102
+    def stance(self, use_sensors: bool) -> Stance: ...  # noqa: D102
     def next_pose(self) -> tuple[float, float, float]: ...  # noqa: D102
     def stop_joints(self, names: Sequence[str]) -> None: ...  # noqa: D102
     def busy(self, names: Sequence[str]) -> bool: ...  # noqa: D102

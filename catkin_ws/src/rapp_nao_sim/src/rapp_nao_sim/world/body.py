@@ -89,9 +89,10 @@ class Body:
         return bool(self._bullet.getClosestPoints(self._robot, other, 0.0))
 
     def velocity(self) -> tuple[float, float, float]:
-        """vx, vy (m/s) and turning (rad/s) of the torso in the world."""
-        (x, y, _), (_, _, turn) = self._bullet.getBaseVelocity(self._robot)
-        return (float(x), float(y), float(turn))
+        """Ahead, to the left (m/s) and turning (rad/s) of the torso on the floor."""
+        (x, y, _), (_, _, turning) = self._bullet.getBaseVelocity(self._robot)
+        cos, sin = math.cos(self.heading()), math.sin(self.heading())
+        return (cos * x + sin * y, cos * y - sin * x, float(turning))
 
     def still(self) -> bool:
         """Whether the torso rests, as good as the solver's noise lets one see."""
@@ -123,6 +124,11 @@ class Body:
         """Pitch (forward positive) and roll (to the right positive) of the torso."""
         forward, left, up = self._axes()
         return math.atan2(-forward[2], up[2]) if abs(left[2]) < 0.9 else 0.0, math.asin(max(-1.0, min(1.0, left[2])))
+
+    def up(self) -> tuple[float, float, float]:
+        """The vertical in the torso's frame."""
+        forward, left, up = self._axes()
+        return (float(forward[2]), float(left[2]), float(up[2]))
 
     def hips(self) -> float:
         """Height of the hips above the floor, m."""

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rapp_nao_sim.world.errors import Refused
+from rapp_nao_sim.world.frames import Stance
 from rapp_nao_sim.world.worker import Worker
 
 MOVE_TIMEOUT = 30.0  # s, more than any movement at full speed takes, with its planning
@@ -100,6 +101,11 @@ class BodyClient:
     def odometry(self, use_sensors: bool = True) -> tuple[float, float, float]:
         """Where the robot believes to be by its legs' sensors or commands, in the frame where it was first."""
         return self._tuple("odometry" if use_sensors else "planned_pose")
+
+    def stance(self, use_sensors: bool = True) -> Stance:
+        """What tells where the body's parts are: joints as sensed or as commanded, the vertical, the odometry."""
+        stance: Stance = self._physics.call("stance", use_sensors)
+        return stance
 
     def next_pose(self) -> tuple[float, float, float]:
         """Where it believes to be after its present step."""

@@ -4,13 +4,13 @@ A change of posture sets joints and torso along a way that always rests on the f
 meanwhile joints that are commanded one by one follow their own tracks.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rapp_nao_sim.world.body import Body
 from rapp_nao_sim.world.change import Change, upright
 from rapp_nao_sim.world.errors import Refused
+from rapp_nao_sim.world.frames import Stance
 from rapp_nao_sim.world.model import BODY, CHAINS, JOINTS, TWINS
 from rapp_nao_sim.world.moves import Track, clip, direct, posture_time, through
 from rapp_nao_sim.world.postures import LEAN_TOLERANCE, Posture, family, recognise
@@ -179,12 +179,12 @@ class Motion:
 
     def velocity(self) -> tuple[float, float, float]:
         """Ahead, to the left (m/s) and turning (rad/s): of the step under way, or of the torso when it does not walk."""
-        walking = self.walk.velocity()
-        if walking is not None:
-            return walking
-        x, y, turning = self._body.velocity()
-        cos, sin = math.cos(self._body.heading()), math.sin(self._body.heading())
-        return (cos * x + sin * y, cos * y - sin * x, turning)
+        return self.walk.velocity() or self._body.velocity()
+
+    def stance(self, use_sensors: bool) -> Stance:
+        """What tells where the body's parts are."""
+        angles, pose = (self._body.angles(), self.walk.odometry.pose) if use_sensors else (self.targets, self.walk.planned_pose())
+        return Stance(angles, self._body.up(), pose)
 
     def awake(self) -> bool:
         """Whether the legs have stiffness."""

@@ -12,6 +12,7 @@ from rapp_nao_sim.world.asking import World, asking
 from rapp_nao_sim.world.model import JOINTS
 from rapp_nao_sim.world.moves import Track
 from rapp_nao_sim.world.posture_module import ALRobotPosture
+from rapp_nao_sim.world.tracker_module import ALTracker
 from rapp_nao_sim.world.walk_module import Walking
 
 LONGEST = 60.0  # s, of one interpolation
@@ -20,7 +21,7 @@ RAMP = 0.05  # s between two stiffnesses of an interpolation
 
 def modules(world: World) -> dict[str, Any]:
     """The modules to register, by name."""
-    return {"ALMotion": ALMotion(world), "ALRobotPosture": ALRobotPosture(world)}
+    return {"ALMotion": ALMotion(world), "ALRobotPosture": ALRobotPosture(world), "ALTracker": ALTracker(world)}
 
 
 @qi.multiThreaded()

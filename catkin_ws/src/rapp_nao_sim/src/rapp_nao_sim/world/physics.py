@@ -90,6 +90,7 @@ class Physics:
             "planned_pose": motion.walk.planned_pose,
             "busy": motion.busy,
             "odometry": lambda: motion.walk.odometry.pose,
+            "stance": motion.stance,
             "next_pose": motion.walk.next_pose,
             "stop": motion.stop,
             "stop_joints": motion.stop_joints,

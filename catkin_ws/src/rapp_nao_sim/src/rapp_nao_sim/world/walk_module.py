@@ -2,9 +2,10 @@
 
 from typing import Any
 
-from rapp_nao_sim.naoqi import Module, NaoqiError
+from rapp_nao_sim.naoqi import NaoqiError
 from rapp_nao_sim.world.arguments import number
 from rapp_nao_sim.world.asking import World, asking
+from rapp_nao_sim.world.frames_module import Frames
 from rapp_nao_sim.world.walk import FASTEST
 
 # Name: default, least, greatest; lengths in m, angles in rad, the frequency as a share.
@@ -22,10 +23,11 @@ LONGEST = 600.0  # s of waiting for the end of a walk
 _INIT_SPEED = 0.6
 
 
-class Walking(Module):
+class Walking(Frames):
     """Walks over the floor; m, rad, s. A new command replaces the one under way."""
 
     def __init__(self, world: World) -> None:
+        super().__init__(world)
         self.__world = world
 
     @asking
