@@ -32,6 +32,10 @@ RATE = 22050  # Hz, espeak-ng's own
 SPEED = 150  # words a minute
 BEFORE, AFTER = 0.4, 0.6  # seconds of noise around the speech
 QUICK_STEP = 5  # --quick takes every fifth utterance
+HEAD = (
+    f"{'':<22}{'commands':^27}   |{'foreign sentences':^19}   |{'all':^16}\n"
+    f"{'':<22}{'right':>8}{'wrong':>9}{'not und.':>10}   |{'refused':>10}{'wrong':>9}   |{'wrong':>9}{'count':>7}"
+)
 
 
 @dataclass(frozen=True)
@@ -119,10 +123,6 @@ def wrong_share(answers: list[Answer]) -> float:
 
 
 def table(answers: list[Answer], voices: list[str]) -> str:
-    head = [
-        f"{'':<22}{'commands':^27}   |{'foreign sentences':^19}   |{'all':^16}",
-        f"{'':<22}{'right':>8}{'wrong':>9}{'not und.':>10}   |{'refused':>10}{'wrong':>9}   |{'wrong':>9}{'count':>7}",
-    ]
     by_voice = [line(f"voice {v}", (a for a in answers if a.utterance.voice == v)) for v in voices]
     by_noise = [line(f"{n} dB", (a for a in answers if a.utterance.noise == n)) for n in NOISES]
     both = [
@@ -130,7 +130,7 @@ def table(answers: list[Answer], voices: list[str]) -> str:
         for v in voices
         for n in NOISES
     ]
-    return "\n".join([*head, *both, "", *by_voice, "", *by_noise, "", line("overall", answers)])
+    return "\n".join([HEAD, *both, "", *by_voice, "", *by_noise, "", line("overall", answers)])
 
 
 def options() -> argparse.Namespace:

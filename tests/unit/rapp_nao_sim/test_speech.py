@@ -73,7 +73,7 @@ def test_an_error_of_espeak_does_not_repeat_what_was_to_be_said():
 
 
 def test_probabilities_are_some_and_grow_with_the_evidence():
-    values = [probability(ratio, 60) for ratio in (-3000.0, -200.0, -60.0, 0.0, 60.0, 3000.0)]
+    values = [probability(ratio, 60, 4) for ratio in (-3000.0, -200.0, -60.0, 0.0, 150.0, 3000.0)]
     assert values == sorted(values)
     assert all(0.0 <= value <= 1.0 for value in values)
     assert values[1] < 0.01
@@ -81,7 +81,7 @@ def test_probabilities_are_some_and_grow_with_the_evidence():
 
 
 def test_very_short_sounds_count_as_a_little_longer():
-    assert probability(10.0, 0) == probability(10.0, 8)
+    assert probability(10.0, 0, 4) == probability(10.0, 8, 4)
 
 
 def test_the_noise_floor_is_the_level_of_the_quietest_tenth():
