@@ -102,14 +102,24 @@ class FakeEars:
 class FakeRecorder:
     def __init__(self, body: Body) -> None:
         self._body = body
+        self._wrong: Refused | None = None
 
     def start(self, path: Path) -> None:
         self._body.note("startMicrophonesRecording")
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._body.recording = path
+        if path.is_dir():
+            self._wrong = Refused(f"cannot write {path}: it is a folder")
+        else:
+            self._body.recording = path
+
+    def check(self) -> None:
+        wrong, self._wrong = self._wrong, None
+        if wrong is not None:
+            raise wrong
 
     def stop(self) -> None:
         self._body.note("stopMicrophonesRecording")
+        self.check()
         if self._body.recording is not None:
             self._body.recording.write_bytes(b"OggS")
             self._body.recording = None

@@ -58,10 +58,13 @@ class Recorder(Protocol):
     """Virtual receptor r_mic as recorder (paper Fig. 7)."""
 
     def start(self, path: Path) -> None:
-        """Record the front microphone as Ogg Vorbis into `path`, asynchronously. Raises Refused, Unreachable."""
+        """Record the front microphone as Ogg Vorbis into `path`, asynchronously. Raises Unreachable."""
+
+    def check(self) -> None:
+        """Raise what is known by now to be wrong with the recording: Refused, Unreachable."""
 
     def stop(self) -> None:
-        """End the recording; the file is complete when this returns."""
+        """End the recording; the file is complete when this returns. Raises what was wrong with it, unless `check` did."""
 
     def energy(self) -> float:
         """Energy at the front microphone in NAOqi's units (ambient noise is below about 1700)."""

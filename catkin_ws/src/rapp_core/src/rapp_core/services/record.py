@@ -58,6 +58,10 @@ def _machine(name: str, context: Context, check: Transition, during: Transition,
         recorder.start(path)
         share.memory["begun"] = context.now()
 
+    def record(share: Subsystem) -> None:
+        recorder.check()
+        during(share)
+
     def stop(share: Subsystem) -> None:
         trace.send("core", "ALAudioRecorder", "stopMicrophonesRecording")
         recorder.stop()
@@ -70,7 +74,7 @@ def _machine(name: str, context: Context, check: Transition, during: Transition,
         name,
         {
             "start": Behaviour("start", start, label="start recording"),
-            "record": Behaviour("record", during, over, label="the time passes"),
+            "record": Behaviour("record", record, over, label="the time passes"),
             "stop": Behaviour("stop", stop, label="stop recording"),
             "reply": Behaviour("reply", answer, label="reply with the path"),
         },
