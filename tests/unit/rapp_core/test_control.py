@@ -458,3 +458,46 @@ def test_told_to_end_during_a_run_nothing_is_left(home: Home) -> None:
     home.control.close()
     assert not home.agents.runs[0].alive
     assert home.fake.journal[-5:] == ["stop motion", "stop playing", "hush", "end", "rest"]
+
+
+def moves(home: Home, **script: Any) -> Script:
+    """A dynamic agent that walks."""
+
+    def walk(agent: FakeAgent) -> None:
+        home.executor.run_for(home.lease.check(agent.token), "rapp_move_to", x=0.05, y=0.0, theta=0.0)
+
+    return Script(acts=[(0.3, walk)], **script)
+
+
+@pytest.mark.parametrize(
+    "script", [{}, {"outcome": ("failed", "of no use")}, {"terminate": None, "crash": 2.0}, {"terminate": None, "silent": 2.0}]
+)
+def test_a_rapp_that_moved_the_robot_leaves_it_resting_once(home: Home, script: dict[str, Any]) -> None:
+    home.agents.script = moves(home, **script)
+    home.start()
+    ask(home)
+    home.round()
+    journal = home.fake.journal
+    assert journal.count("rest") == 1
+    assert journal.index("stop motion") < journal.index("rest") < journal.index("end")
+    home.agents.script = Script()
+    ask(home)
+    home.happenings.clear()
+    home.happenings.append(Happening("core", "core", "s3", "entered", "listen"))
+    home.round()
+    assert journal.count("rest") == 1
+
+
+def test_a_rapp_that_moved_nothing_leaves_the_robot_as_it_is(home: Home) -> None:
+    home.start()
+    ask(home)
+    home.round()
+    assert "rest" not in home.fake.journal
+
+
+def test_a_robot_that_cannot_be_let_rest_does_not_keep_the_core_agent(home: Home) -> None:
+    home.agents.script = moves(home)
+    home.start()
+    ask(home)
+    home.fake.motion.release = lambda: home.fake.motion.take_posture("none", 1.0)  # type: ignore[method-assign]
+    assert home.round() == KEYWORD

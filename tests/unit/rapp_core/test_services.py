@@ -7,43 +7,9 @@ from typing import Any
 
 import pytest
 
-from fakes.agents import FakeAgent, Script
-from fakes.clock import Clock
-from fakes.rapps import write_rapp
-from fakes.robot import FakeRobot
-from rapp_core.config import Config
+from fakes.bench import Bench
 from rapp_core.errors import CoreError, Invalid, Refused, Unreachable
 from rapp_core.launcher.lease import Grant
-from rapp_core.manifest import read_manifest
-from rapp_core.services.context import Context
-from rapp_core.services.executor import Executor
-from rapp_core.trace import Happening, Trace
-
-
-class Bench:
-    """An executor with all around it, and a dynamic agent that calls."""
-
-    def __init__(self, folder: Path) -> None:
-        self.clock = Clock()
-        self.fake = FakeRobot(self.clock)
-        self.trace = Trace()
-        self.happenings: list[Happening] = []
-        self.trace.listen(self.happenings.append)
-        config = Config(home=folder, threshold=0.4, recognise_timeout=8.0)
-        context = Context(self.fake.robot, config, self.trace, folder / "listening", now=self.clock.now)
-        self.executor = Executor(context)
-        package = write_rapp(folder / "run" / "package", "probe")
-        self.agent = FakeAgent(self.clock, folder / "run", read_manifest(package), Script(terminate=None), [], lambda _m: None)
-        self.cut = self.clock.event()
-
-    def call(self, name: str, **request: Any) -> dict[str, Any]:
-        return self.executor.run_for(Grant(self.agent, self.cut), name, **request)
-
-    def messages(self) -> list[str]:
-        return [each.detail for each in self.happenings if each.kind == "message"]
-
-    def states(self) -> list[str]:
-        return [each.state for each in self.happenings if each.kind == "entered"]
 
 
 @pytest.fixture

@@ -15,6 +15,8 @@ from rapp_core.services.place import FRAMES, Waypoint
 
 MOST = 100  # poses of a path
 TURN_FIRST = math.radians(20)  # rad to the side of a pose above which the robot turns before it walks there
+NEARLY = 0.05  # m before a goal from where what is left says no more in which direction the robot walks
+ON_THE_SPOT = Pose2D(0.0, 0.0, 0.0)
 THERE = 0.1  # m from a pose within which it is not turned to
 
 
@@ -25,12 +27,12 @@ class _Walk:
         self._context = context
         self._motion = context.robot.motion
         self._feeling = Every(context, FEELING)
-        self._start = self._pose = self._goal = Pose2D(0.0, 0.0, 0.0)
+        self._start = self._pose = self._goal = self._way = ON_THE_SPOT
         self._goals: list[Pose2D] = []
         self._reached = 0
 
-    def plan(self, waypoints: Sequence[Waypoint]) -> None:
-        """Where to walk, from where the robot is. Raises Invalid, Refused."""
+    def plan(self, waypoints: Sequence[Waypoint], turns: bool) -> None:
+        """Where to walk, from where the robot is; `turns`: towards a goal before it walks there. Raises Refused."""
         context, start = self._context, self._motion.pose()
         self._start = self._pose = start
         self._goals = [context.place.in_odom(waypoint, start) for waypoint in waypoints]
@@ -40,7 +42,8 @@ class _Walk:
             raise Refused(f"cannot walk {length:.1f} m: {most}")
         self._goal = self._goals[0]
         way = self.left()
-        refuse_hazard(context, Pose2D(0.0, 0.0, 0.0) if self._askew(way) else way)
+        self._way = ON_THE_SPOT if turns and self._askew(way) else way
+        refuse_hazard(context, self._way)
 
     def left(self) -> Pose2D:
         """What is left of the way to the present goal, in base_link."""
@@ -65,12 +68,14 @@ class _Walk:
     def turn(self, _share: Subsystem) -> Movement:
         """Turn towards the goal."""
         way = self.left()
+        self._way = ON_THE_SPOT
         return self._walk(Pose2D(0.0, 0.0, math.atan2(way.y, way.x)))
 
     def walk(self, _share: Subsystem) -> Movement:
         """Walk to the goal."""
         self._pose = self._motion.pose()
-        return self._walk(self.left())
+        self._way = self.left()
+        return self._walk(self._way)
 
     def _walk(self, way: Pose2D) -> Movement:
         self._context.trace.call("core", "ALMotion", "moveTo")
@@ -80,13 +85,10 @@ class _Walk:
         """The robot's reflexes on its way to the goal."""
         if self._feeling.due():
             self._pose = self._motion.pose()
-            refuse_hazard(self._context, self.left())
-
-    def watch_turning(self, _share: Subsystem) -> None:
-        """The robot's reflexes while it turns."""
-        if self._feeling.due():
-            self._pose = self._motion.pose()
-            refuse_hazard(self._context, Pose2D(0.0, 0.0, 0.0))
+            left = self.left()
+            if self._way != ON_THE_SPOT and math.hypot(left.x, left.y) > NEARLY:
+                self._way = left
+            refuse_hazard(self._context, self._way)
 
     def arrive(self, _share: Subsystem) -> None:
         """Judge where the robot has come to. Raises Refused."""
@@ -123,7 +125,7 @@ def machine(context: Context) -> Machine:
         if not finite(x, y, theta):
             raise Invalid("cannot walk there: x, y and theta must be numbers; m and rad")
         # The way round is the same pose: NAOqi would turn on the spot for a theta of many turns.
-        do.plan([Waypoint("base_link", Pose2D(x, y, turned(theta)))])
+        do.plan([Waypoint("base_link", Pose2D(x, y, turned(theta)))], turns=False)
 
     return Machine(
         "rapp_move_to",
@@ -152,7 +154,7 @@ def path_machine(context: Context) -> Machine:
                 raise Invalid(f"cannot use pose {number} in frame {waypoint.frame!r}: known are {', '.join(FRAMES)}")
             if not finite(waypoint.pose.x, waypoint.pose.y, waypoint.pose.theta):
                 raise Invalid(f"cannot use pose {number}: its position and orientation must be numbers")
-        do.plan(poses)
+        do.plan(poses, turns=True)
 
     return Machine(
         "rapp_move_along_path",
@@ -160,7 +162,7 @@ def path_machine(context: Context) -> Machine:
             "check": Behaviour("check", check, label="check"),
             "stand": standing_up(context),
             "next": Behaviour("next", do.next, label="next pose"),
-            "turn": motion(context, "turn", do.turn, "moveTo", do.watch_turning, do.on_path),
+            "turn": motion(context, "turn", do.turn, "moveTo", do.watch, do.on_path),
             "walk": motion(context, "walk", do.walk, "moveTo", do.watch, do.on_path),
             "judge": Behaviour("judge", do.arrive, label="judge"),
             "arrived": Behaviour("arrived", lambda _share: None, label="arrived"),
