@@ -38,7 +38,6 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RobotBehindFault
     robot = RobotBehindFaults(folder, [short_voice_mail(folder / "voice_mail")], PROFILE, login=True)
     try:
         robot.start()
-        robot.until_listening()
         yield robot
     finally:
         robot.close()

@@ -42,7 +42,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RobotBehindFault
     robot.settings = SETTINGS
     try:
         robot.start()
-        robot.until_listening()
+        robot.served("fine", "fine")
         yield robot
     finally:
         robot.close()

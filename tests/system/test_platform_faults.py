@@ -51,7 +51,6 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RobotBehindFault
         robot.start("roscore", "cloud", "nao_sim", "rosbridge")
         robot.stop("cloud")
         robot.start("link", "core_agent")
-        robot.until_listening()
         robot.served("old", "old")
         robot.start("cloud")
         robot.until(lambda seen: seen.detail == "link->core reply register")
