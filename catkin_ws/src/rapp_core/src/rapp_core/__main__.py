@@ -26,6 +26,7 @@ from rapp_core.ros.hop import RosHop
 from rapp_core.ros.node import join, leave, log_to_stderr
 from rapp_core.ros.services import RosServices
 from rapp_core.ros.state import StatePublisher
+from rapp_core.ros.topics.offer import streams
 from rapp_core.services.context import Context
 from rapp_core.services.executor import Executor
 from rapp_core.services.outside import Outside
@@ -69,13 +70,17 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     nao = robot(connection, config)
     trace, states, lease = Trace(), StatePublisher(), Lease(config)
     trace.listen(states.tell)
-    executor, hop = Executor(Context(nao, config, trace, config.home / "listening", cut=stop)), RosHop(stop, trace)
+    context, hop = Context(nao, config, trace, config.home / "listening", cut=stop), RosHop(stop, trace)
+    executor = Executor(context)
     platform = Platform(hop, config)
     control = Control(Parts(nao, hop, launcher, executor, platform, lease, trace, config, stop))
     RosServices(executor, Outside(hop, config, stop), lease, trace)
     RosActions(executor, lease, trace)
     machine, rejoining = core_machine(control), Rejoining()
     machine.listen(trace.core_event)
+    topics = streams(nao, hop, trace, lambda: context.place.odom, config)
+    for stream in topics:
+        stream.start()
     threading.Thread(target=_hush_at_end, args=(nao.voice, stop), name="hush", daemon=True).start()
     print("READY " + json.dumps({"node": rospy.get_name()}), flush=True)
     share = Subsystem("core", memory={"problem": None})
@@ -85,6 +90,8 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     finally:
         stop.set()
         rejoining.close()
+        for stream in topics:
+            stream.close()
         control.close()
         platform.close()
         states.close()

@@ -61,6 +61,9 @@ class Config:
     near: float = 0.3  # m; an obstacle nearer than this stops a robot that walks towards it
     motion_time: float = 180.0  # s of one motion
     posture_speed: float = 0.6  # share of the greatest speed, of postures unless told otherwise
+    body_rate: float = 25.0  # 1/s, of joint_states, odom, sonar, bumper and /tf while somebody subscribes
+    camera_rate: float = 5.0  # 1/s, of the cameras' topics while somebody subscribes
+    camera_resolution: int = 1  # of the cameras' topics: 1 QVGA, 2 VGA, 3 4VGA
     joint_speed: float = 0.3  # share of the greatest speed, of joints unless told otherwise
     warm_up: float = 20.0  # s for a spare to import rospy and join ROS
     first_word: float = 15.0  # s from activation to the dynamic agent's first word
