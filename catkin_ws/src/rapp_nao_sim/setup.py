@@ -3,6 +3,9 @@ from setuptools import find_packages, setup
 
 setup(
     **generate_distutils_setup(
-        packages=find_packages("src"), package_dir={"": "src"}, package_data={"rapp_nao_sim.world": ["*.toml"]}
+        packages=find_packages("src"),
+        py_modules=["vision_definitions"],
+        package_dir={"": "src"},
+        package_data={"rapp_nao_sim.world": ["*.toml"]},
     )
 )

@@ -15,6 +15,14 @@ _log = logging.getLogger(__name__)
 _running = threading.BoundedSemaphore(100)  # calls at work at once; more are refused rather than piled up
 # What a client is told in its own words; arguments of a wrong type are among it.
 _TOLD = (SimError, WorldError, TypeError, ValueError)
+# What ends a call under way when its client cancels it: a method of the same module.
+_ENDED_BY = {
+    "ALMotion::moveTo": "stopMove",
+    "ALMotion::angleInterpolation": "killAll",
+    "ALMotion::angleInterpolationWithSpeed": "killAll",
+    "ALRobotPosture::goToPosture": "stopMove",
+    "ALRobotPosture::applyPosture": "stopMove",
+}
 
 
 class NaoqiError(SimError):
@@ -25,8 +33,8 @@ def working(method: Callable[..., Any]) -> Callable[..., Any]:
     """Make a module's method give a future resolved from a thread of its own, so that no thread of libqi ever waits."""
 
     def call(self: Any, *args: Any) -> Any:
-        promise = qi.Promise()
         name = _name(self, method)
+        promise = qi.Promise(lambda _promise: _end(self, name))
         if not _running.acquire(blocking=False):
             promise.setError(f"{name}\n\ttoo many calls at once")
             return promise.future()
@@ -63,6 +71,12 @@ def promised(name: str, future: "Future[Any]") -> Any:
 
     future.add_done_callback(tell)
     return promise.future()
+
+
+def _end(module: Any, name: str) -> None:
+    """End a call that its client cancels, where that is possible; it then gives what it gives when it is stopped."""
+    if name in _ENDED_BY:
+        getattr(module, _ENDED_BY[name])()
 
 
 def _work(promise: Any, name: str, method: Callable[..., Any], module: Any, args: tuple[Any, ...]) -> None:
