@@ -10,7 +10,7 @@ from rapp_core.geometry import finite
 from rapp_core.services.context import Context, request
 from rapp_core.services.moving import motion
 
-ROUNDING = 1e-5  # rad; the request's numbers are of single precision
+ROUNDING = 1e-3  # rad; the ranges are known rounded, and the request's numbers are of single precision
 FARTHEST = 100.0  # m of a point to look at
 
 
