@@ -4,6 +4,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
 from rapp_api import DynamicAgent, RappError, Refused, Unreachable
@@ -88,3 +90,22 @@ def test_clock_tells_the_hour() -> None:
 def test_parrot_plays_what_it_has_recorded() -> None:
     core = run("parrot")
     assert ("play_audio", core.recordings[0]) in core.calls
+
+
+def code(text: str) -> "np.ndarray[Any, Any]":
+    """A picture of a QR code on a grey wall."""
+    marker = cv2.QRCodeEncoder_create().encode(text)
+    wall = np.full((480, 640, 3), 90, np.uint8)
+    wall[100:340, 200:440] = cv2.cvtColor(cv2.resize(marker, (240, 240), interpolation=cv2.INTER_NEAREST), cv2.COLOR_GRAY2BGR)
+    return wall
+
+
+def test_look_around_says_each_code_once_and_rests() -> None:
+    core = run("look_around", pictures=[code("kitchen"), code("kitchen"), code("door")])
+    assert core.said() == ["I read: kitchen", "I read: door"]
+    assert [name for name, _ in core.calls if name == "look_at_point"] == ["look_at_point"] * 3
+    assert core.posture == "Crouch"
+
+
+def test_look_around_says_that_there_is_nothing() -> None:
+    assert run("look_around").said() == ["I see nothing to read"]
