@@ -63,7 +63,7 @@ def _facade(module: ALModule) -> Any:
 def _remote(module: ALModule, name: str) -> Callable[..., Any]:
     def call(_facade: Any, *args: Any) -> Any:
         promise = qi.Promise()
-        threading.Thread(target=_work, args=(promise, module, name, args), daemon=True, name=name).start()
+        sessions.run(threading.Thread(target=_work, args=(promise, module, name, args), daemon=True, name=name))
         return promise.future()
 
     call.__name__ = name
