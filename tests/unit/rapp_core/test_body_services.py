@@ -31,7 +31,7 @@ def test_joints_are_moved_and_waited_for(bench: Bench) -> None:
 
 def test_no_speed_is_the_core_agent_s_own(bench: Bench) -> None:
     joints(bench, {"HeadYaw": 0.5})
-    bench.call("rapp_take_posture", posture="Sit", speed=0.0)
+    bench.call("rapp_take_predefined_posture", posture="Sit", speed=0.0)
     assert bench.fake.journal == ["joints HeadYaw 0.50 at 0.3", "posture Sit at 0.6"]
 
 
@@ -70,7 +70,7 @@ def test_joints_of_different_limbs_move_at_a_time(bench: Bench) -> None:
     ("name", "request_", "told"),
     [
         ("rapp_move_joint", {"joints": ["HeadYaw"], "angles": [0.5], "speed": 0.0}, {"angles": (0.0,)}),
-        ("rapp_take_posture", {"posture": "Sit", "speed": 0.0}, {"posture": "Unknown"}),
+        ("rapp_take_predefined_posture", {"posture": "Sit", "speed": 0.0}, {"posture": "Unknown"}),
     ],
 )
 def test_a_goal_is_told_how_far_it_is(bench: Bench, name: str, request_: dict[str, Any], told: dict[str, Any]) -> None:
@@ -82,7 +82,7 @@ def test_a_goal_is_told_how_far_it_is(bench: Bench, name: str, request_: dict[st
 
 def test_postures_that_are_not_known_are_invalid_and_the_known_named(bench: Bench) -> None:
     with pytest.raises(Invalid, match="'Headstand': known are Stand, StandInit"):
-        bench.call("rapp_take_posture", posture="Headstand", speed=0.0)
+        bench.call("rapp_take_predefined_posture", posture="Headstand", speed=0.0)
     with pytest.raises(Invalid, match="'Stand': known are Crouch, Sit"):
         bench.call("rapp_rest", posture="Stand")
     assert bench.fake.journal == []
@@ -194,12 +194,12 @@ STILL: dict[str, dict[str, Any]] = {
     "rapp_capture_image": {"camera": "top", "resolution": 0},
     "rapp_set_camera_param": {"camera": 0, "parameter": 0, "value": 1},
     "rapp_look_at_point": {"x": 1.0, "y": 0.0, "z": 0.0},
-    "rapp_take_posture": {"posture": "Sit", "speed": 0.0},
+    "rapp_take_predefined_posture": {"posture": "Sit", "speed": 0.0},
     "rapp_rest": {"posture": ""},
 }
 
 
-@pytest.mark.parametrize("name", ["rapp_capture_image", "rapp_look_at_point", "rapp_take_posture", "rapp_rest"])
+@pytest.mark.parametrize("name", ["rapp_capture_image", "rapp_look_at_point", "rapp_take_predefined_posture", "rapp_rest"])
 def test_a_robot_that_is_away_is_unreachable_and_works_again_when_it_is_back(bench: Bench, name: str) -> None:
     bench.fake.body.here = False
     with pytest.raises(Unreachable):

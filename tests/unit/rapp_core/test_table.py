@@ -11,6 +11,7 @@ from rapp_api.core_agent import CoreAgent
 from rapp_api.ros_core_agent import RosCoreAgent
 from rapp_api.testing import FakeCoreAgent
 from rapp_core.services.table import CORE_SERVICES, CoreService
+from rapp_hop.hz.manifest import CORE_SERVICES as PERMITTED
 
 ROOT = Path(__file__).parents[3]
 MSGS = ROOT / "catkin_ws" / "src" / "rapp_msgs"
@@ -60,7 +61,13 @@ def test_names_are_given_once() -> None:
 
 @rows
 def test_a_name_is_that_of_its_type(row: CoreService) -> None:
-    assert row.name == "rapp" + re.sub("([A-Z])", lambda found: "_" + found[1].lower(), row.srv)
+    long = {"TakePosture": "TakePredefinedPosture"}.get(row.srv, row.srv)  # DESIGN 3.1 calls the action so
+    assert row.name == "rapp" + re.sub("([A-Z])", lambda found: "_" + found[1].lower(), long)
+
+
+def test_a_package_can_be_permitted_what_is_offered_and_nothing_else() -> None:
+    outside = {"rapp_cloud_call", "rapp_send_mail"}
+    assert {row.name for row in CORE_SERVICES} | outside == PERMITTED
 
 
 @rows

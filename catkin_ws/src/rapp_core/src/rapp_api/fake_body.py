@@ -13,7 +13,7 @@ from rapp_api.poses import Pose
 
 POSTURES = ("Stand", "StandInit", "StandZero", "Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
 RESTING = ("Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
-ACTIONS = ("rapp_move_to", "rapp_move_along_path", "rapp_take_posture", "rapp_move_joint")
+ACTIONS = ("rapp_move_to", "rapp_move_along_path", "rapp_take_predefined_posture", "rapp_move_joint")
 SIZES = {0: (160, 120), 1: (320, 240), 2: (640, 480), 3: (1280, 960)}
 FASTEST = {"x": 0.1, "y": 0.06, "theta": 0.5}  # m/s, m/s, rad/s
 FARTHEST = 10.0  # m of one walk
@@ -83,7 +83,7 @@ class FakeBody:
 
     def take_posture(self, posture: str, speed: float) -> None:
         """Be in it."""
-        self._begin("rapp_take_posture", "take_posture", posture)
+        self._begin("rapp_take_predefined_posture", "take_posture", posture)
         _check(posture in POSTURES, f"take posture {posture!r}: known are {', '.join(POSTURES)}")
         _check(0 <= speed <= 1, "move: speed is a share from 0 to 1")
         self.posture = posture

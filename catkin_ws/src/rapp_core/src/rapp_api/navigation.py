@@ -81,7 +81,7 @@ def get_transform(name: str, space: int) -> NDArray[np.float64]:
 
 
 def action_client(name: str) -> Any:
-    """An ordinary actionlib.SimpleActionClient of rapp_move_to, rapp_move_along_path, rapp_take_posture or rapp_move_joint.
+    """An ordinary actionlib.SimpleActionClient of rapp_move_to, rapp_move_along_path, rapp_take_predefined_posture or rapp_move_joint.
 
     Goals are made of rapp_msgs.msg, such as MoveToGoal; the action is the one of the function of the same name, with feedback and
     cancel. A newer goal ends an older one that moves the same limbs.

@@ -16,7 +16,7 @@ from rapp_api.errors import Invalid
 ACTIONS = {
     "rapp_move_to": "MoveTo",
     "rapp_move_along_path": "MoveAlongPath",
-    "rapp_take_posture": "TakePosture",
+    "rapp_take_predefined_posture": "TakePosture",
     "rapp_move_joint": "MoveJoint",
 }
 """Types of rapp_msgs/action by name."""

@@ -38,7 +38,7 @@ class RosBody(ABC):
 
     def take_posture(self, posture: str, speed: float) -> None:
         """See `CoreAgent`."""
-        self._call("rapp_take_posture", "TakePosture", posture=posture, speed=speed)
+        self._call("rapp_take_predefined_posture", "TakePosture", posture=posture, speed=speed)
 
     def look_at_point(self, x: float, y: float, z: float) -> None:
         """See `CoreAgent`."""

@@ -1,4 +1,4 @@
-"""rapp_take_posture and rapp_rest: takePredefinedPosture and rest of the deliverable (section 4.5.2)."""
+"""rapp_take_predefined_posture and rapp_rest: takePredefinedPosture and rest of the deliverable (section 4.5.2)."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -31,7 +31,7 @@ def machine(context: Context) -> Machine:
         return {"posture": robot.posture()}
 
     return Machine(
-        "rapp_take_posture",
+        "rapp_take_predefined_posture",
         {
             "check": Behaviour("check", check, label="check"),
             "take": motion(context, "take", take, "goToPosture", feedback=now),
