@@ -89,6 +89,23 @@ def test_a_robot_that_ends_its_walk_by_itself_is_told_of(bench: Bench) -> None:
         walk(bench)
 
 
+def test_why_a_robot_has_ended_its_walk_by_itself_is_told_where_it_is_felt(bench: Bench) -> None:
+    def protect() -> None:
+        bench.fake.feeling.feel(bumpers=(False, True))
+        bench.fake.motion.stop()
+
+    for begin in (walk, drive):
+        bench.fake.feeling.feel(bumpers=(False, False))
+        bench.clock.after(3.01, protect)
+        if begin is walk:
+            with pytest.raises(Refused, match="bumper of the right"):
+                walk(bench)
+        else:
+            drive(bench)
+            bench.go_on()
+            assert "bumper of the right" in bench.messages()[-1]
+
+
 def test_a_walk_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     bench = Bench(tmp_path, **{**CONFIG, "motion_time": 5.0})
     with pytest.raises(Refused, match="more than 5 s"):
@@ -163,7 +180,7 @@ def test_a_walking_robot_is_felt_twenty_times_a_second(bench: Bench) -> None:
 MOTIONS: dict[str, tuple[str, dict[str, Any]]] = {
     "walk": ("rapp_move_to", {"x": 5.0, "y": 0.0, "theta": 0.0}),
     "path": ("rapp_move_along_path", {"poses": [Waypoint("odom", Pose2D(5.0, 0.0, 0.0))]}),
-    "posture": ("rapp_take_posture", {"posture": "Sit", "speed": 0.0}),
+    "posture": ("rapp_take_predefined_posture", {"posture": "Sit", "speed": 0.0}),
     "joint": ("rapp_move_joint", {"joints": ["HeadYaw"], "angles": [0.5], "speed": 0.0}),
     "look": ("rapp_look_at_point", {"x": 1.0, "y": 0.0, "z": 0.4}),
     "rest": ("rapp_rest", {"posture": ""}),
@@ -221,13 +238,13 @@ def test_a_call_waits_for_limbs_and_says_which(bench: Bench, monkeypatch: pytest
 
     def second() -> None:
         try:
-            bench.call("rapp_take_posture", posture="Sit", speed=0.0)
+            bench.call("rapp_take_predefined_posture", posture="Sit", speed=0.0)
         except CoreError as error:
             errors.append(str(error))
 
     bench.clock.at(1.0, second)
     walk(bench)
-    assert errors == ["cannot run rapp_take_posture: the legs is in use; wait for the other call"]
+    assert errors == ["cannot run rapp_take_predefined_posture: the legs is in use; wait for the other call"]
 
 
 def test_a_goal_ends_what_moves_the_same_limbs(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,7 +56,7 @@ def drive_machine(context: Context) -> Machine:
         {
             "look": Behaviour("look", lambda _share: None, label="posture"),
             "stand": standing_up(context),
-            "drive": motion(context, "drive", go, "move", watch),
+            "drive": motion(context, "drive", go, "move", watch, explain=lambda share: refuse_hazard(context, _velocity(share))),
         },
         "look",
         [Edge("look", "drive", prepared, "StandInit"), Edge("look", "stand"), Edge("stand", "drive")],

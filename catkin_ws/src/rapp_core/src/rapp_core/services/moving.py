@@ -41,9 +41,19 @@ def nobody_watches(_share: Subsystem) -> None:
 
 
 def motion(
-    context: Context, name: str, begin: Begin, label: str, watch: Watch = nobody_watches, feedback: Feedback | None = None
+    context: Context,
+    name: str,
+    begin: Begin,
+    label: str,
+    watch: Watch = nobody_watches,
+    feedback: Feedback | None = None,
+    explain: Watch = nobody_watches,
 ) -> Behaviour:
-    """A state that begins a motion and ends with it. Raises Refused when the robot does not carry it out, or not in time."""
+    """A state that begins a motion and ends with it. Raises Refused when the robot does not carry it out, or not in time.
+
+    While it is under way `watch` may refuse it, and `feedback` tells how far it is; `explain` may say why a robot has ended it by
+    itself, such as a NAO that has protected its feet.
+    """
     telling = Every(context, TELLING)
 
     def enter(share: Subsystem) -> None:
@@ -56,6 +66,7 @@ def motion(
         movement: Any = share.memory["movement"]
         if movement.done():
             if not movement.result():
+                explain(share)
                 raise Refused(f"cannot finish: the robot has ended {label} by itself; see whether it can move, and try again")
             share.memory.update(wait=None, undo=None, arrived=True)
             return

@@ -90,7 +90,11 @@ class _Walk:
                 self._way = left
             refuse_hazard(self._context, self._way)
 
-    def arrive(self, _share: Subsystem) -> None:
+    def explain(self, _share: Subsystem) -> None:
+        """Why a robot may have ended its walk by itself. Raises Refused."""
+        refuse_hazard(self._context, self._way)
+
+    def arrive(self, share: Subsystem) -> None:
         """Judge where the robot has come to. Raises Refused."""
         self._context.trace.reply("ALMotion", "core", "moveTo")
         config = self._context.config
@@ -98,6 +102,7 @@ class _Walk:
         left = self.left()
         distance = math.hypot(left.x, left.y)
         if distance > config.walk_error or abs(left.theta) > config.turn_error:
+            self.explain(share)
             off = f"{distance:.2f} m and {abs(left.theta):.2f} rad before the goal"
             raise Refused(f"cannot get there: the robot has stopped {off}; see what is in its way, and try again")
         self._reached += 1
@@ -132,7 +137,7 @@ def machine(context: Context) -> Machine:
         {
             "check": Behaviour("check", check, label="check"),
             "stand": standing_up(context),
-            "walk": motion(context, "walk", do.walk, "moveTo", do.watch, do.from_start),
+            "walk": motion(context, "walk", do.walk, "moveTo", do.watch, do.from_start, do.explain),
             "arrived": Behaviour("arrived", do.arrive, label="judge"),
         },
         "check",
@@ -162,8 +167,8 @@ def path_machine(context: Context) -> Machine:
             "check": Behaviour("check", check, label="check"),
             "stand": standing_up(context),
             "next": Behaviour("next", do.next, label="next pose"),
-            "turn": motion(context, "turn", do.turn, "moveTo", do.watch, do.on_path),
-            "walk": motion(context, "walk", do.walk, "moveTo", do.watch, do.on_path),
+            "turn": motion(context, "turn", do.turn, "moveTo", do.watch, do.on_path, do.explain),
+            "walk": motion(context, "walk", do.walk, "moveTo", do.watch, do.on_path, do.explain),
             "judge": Behaviour("judge", do.arrive, label="judge"),
             "arrived": Behaviour("arrived", lambda _share: None, label="arrived"),
         },
