@@ -1,11 +1,14 @@
 """The core agent for authors' tests refuses what the real one refuses."""
 
 import json
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
+from rapp_msgs.msg import MoveJointGoal, MoveToGoal, TakePostureGoal
 
-from rapp_api import Bug, Invalid, Refused, Unreachable, cloud, communication
+from rapp_api import Bug, Invalid, Pose, Refused, Unreachable, cloud, communication, navigation, vision
 from rapp_api.core_agent import current
 from rapp_api.testing import FakeCoreAgent
 
@@ -62,3 +65,84 @@ def test_it_is_the_core_agent_only_within_its_block() -> None:
         current()
     with pytest.raises(Bug):
         current()
+
+
+def test_its_body_is_where_it_was_told_to_go() -> None:
+    with FakeCoreAgent() as core:
+        navigation.set_global_pose(Pose(1.0, 2.0, math.pi / 2))
+        navigation.move_to(1.0, 0.0, 0.0)
+        assert (navigation.get_robot_pose().x, navigation.get_robot_pose().y) == pytest.approx((1.0, 3.0))
+        navigation.move_along_path([Pose(0.0, 3.0), Pose(0.5, 0.0, 0.0, "base_link")])
+        assert core.pose.y == pytest.approx(3.5)
+        navigation.move_vel(0.1, 0.0, 0.0)
+        navigation.move_stop()
+        navigation.move_joint("HeadYaw", 0.5)
+        navigation.look_at_point(1.0, 0.0, 0.3)
+        navigation.rest()
+        assert (core.velocity, core.joints["HeadYaw"], core.posture) == ((0.0, 0.0, 0.0), 0.5, "Crouch")
+        assert navigation.get_transform("CameraTop", navigation.ROBOT).shape == (4, 4)
+
+
+def test_its_body_has_the_limits_of_the_real_one() -> None:
+    with FakeCoreAgent() as core:
+        for wrong in (
+            lambda: navigation.move_to(math.nan, 0.0, 0.0),
+            lambda: navigation.move_vel(0.0, math.inf, 0.0),
+            lambda: navigation.move_joint("Tail", 0.0),
+            lambda: navigation.move_joint("HeadYaw", 3.0),
+            lambda: navigation.move_joint(["HeadYaw"], [0.0, 0.1]),
+            lambda: navigation.take_predefined_posture("Headstand"),
+            lambda: navigation.rest("Stand"),
+            lambda: navigation.move_along_path([]),
+            lambda: navigation.move_along_path([Pose(0.0, 0.0, 0.0, "moon")]),
+            lambda: navigation.get_transform("CameraTop", 3),
+            lambda: vision.capture_image("left"),
+            lambda: vision.capture_image("top", 4),
+            lambda: vision.set_camera_param(2, 0, 1),
+            lambda: vision.set_camera_params(0, [0], []),
+            lambda: navigation.action_client("rapp_say"),
+        ):
+            with pytest.raises(Invalid, match="cannot"):
+                wrong()
+        for forbidden in (
+            lambda: navigation.move_to(8.0, 8.0, 0.0),
+            lambda: navigation.move_vel(0.2, 0.0, 0.0),
+            lambda: navigation.look_at_point(-1.0, 0.0, 0.0),
+        ):
+            with pytest.raises(Refused, match="cannot"):
+                forbidden()
+        assert core.pose == Pose(0.0, 0.0, 0.0)
+
+
+def test_walks_end_as_the_test_says() -> None:
+    with FakeCoreAgent(walks=[Refused("cannot walk: there is an obstacle"), None]) as core:
+        with pytest.raises(Refused, match="obstacle"):
+            navigation.move_to(1.0, 0.0, 0.0)
+        assert core.pose.x == 0.0
+        navigation.move_to(1.0, 0.0, 0.0)
+        assert core.pose.x == 1.0
+
+
+def test_pictures_come_one_after_another_and_a_failed_one_is_empty(tmp_path: Path) -> None:
+    picture = np.full((2, 3, 3), 7, np.uint8)
+    with FakeCoreAgent(pictures=[picture]):
+        assert np.array_equal(vision.capture_image(), picture)
+        assert vision.capture_image("bottom", vision.QVGA).shape == (240, 320, 3)
+    (tmp_path / "package.json").write_text(json.dumps({"name": "x", "rapp": {"permissions": {"core": [], "cloud": []}}}))
+    with FakeCoreAgent(package=tmp_path):
+        assert vision.capture_image().shape == (0, 0, 3)
+
+
+def test_its_action_clients_carry_goals_out_at_once() -> None:
+    with FakeCoreAgent(walks=[Refused("cannot walk: there is an obstacle")]) as core:
+        for name, goal in (
+            ("rapp_take_predefined_posture", TakePostureGoal(posture="Sit")),
+            ("rapp_move_joint", MoveJointGoal(joints=["HeadYaw"], angles=[0.2])),
+        ):
+            client = navigation.action_client(name)
+            client.send_goal(goal)
+            assert (client.wait_for_result(), client.get_state(), client.get_result().success) == (True, 3, True)
+        assert (core.posture, core.joints["HeadYaw"]) == ("Sit", 0.2)
+        client = navigation.action_client("rapp_move_to")
+        client.send_goal(MoveToGoal(x=1.0))
+        assert (client.get_state(), client.get_result().error) == (4, "refused")

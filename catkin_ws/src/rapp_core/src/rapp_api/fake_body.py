@@ -13,7 +13,13 @@ from rapp_api.poses import Pose
 
 POSTURES = ("Stand", "StandInit", "StandZero", "Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
 RESTING = ("Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
-ACTIONS = ("rapp_move_to", "rapp_move_along_path", "rapp_take_predefined_posture", "rapp_move_joint")
+ACTIONS = {
+    "rapp_move_to": "move_to",
+    "rapp_move_along_path": "move_along_path",
+    "rapp_take_predefined_posture": "take_posture",
+    "rapp_move_joint": "move_joint",
+}
+"""Functions by the names of their actions."""
 SIZES = {0: (160, 120), 1: (320, 240), 2: (640, 480), 3: (1280, 960)}
 FASTEST = {"x": 0.1, "y": 0.06, "theta": 0.5}  # m/s, m/s, rad/s
 FARTHEST = 10.0  # m of one walk
@@ -175,8 +181,7 @@ class FakeActionClient:
 
     def __init__(self, body: FakeBody, name: str) -> None:
         _check(name in ACTIONS, f"make a client of {name}: actions are {', '.join(ACTIONS)}")
-        self._body = body
-        self._work = getattr(body, name.removeprefix("rapp_"))
+        self._work = getattr(body, ACTIONS[name])
         self._error: RappError | None = None
 
     def wait_for_server(self, _timeout: Any = None) -> bool:

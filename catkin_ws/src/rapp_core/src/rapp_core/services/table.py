@@ -49,7 +49,9 @@ CORE_SERVICES = (
     CoreService(
         "rapp_move_joint", "MoveJoint", joints.machine, BODY, "navigation.move_joint", action=True, needs=joints.limbs
     ),
-    CoreService("rapp_take_predefined_posture", "TakePosture", posture.machine, BODY, "navigation.take_predefined_posture", action=True),
+    CoreService(
+        "rapp_take_predefined_posture", "TakePosture", posture.machine, BODY, "navigation.take_predefined_posture", action=True
+    ),
     CoreService("rapp_look_at_point", "LookAtPoint", joints.look_machine, ("head",), "navigation.look_at_point"),
     CoreService("rapp_rest", "Rest", posture.rest_machine, BODY, "navigation.rest"),
     CoreService(
