@@ -117,6 +117,8 @@ def test_a_hard_push_throws_the_robot_over_and_it_gets_up(world: WorldClient) ->
     world.push([60.0, 0.0, 0.0], 0.2)
     until(world.fallen)
     assert world.posture()[1].startswith("Lying")
+    assert set(world.stiffnesses(BODY)) == {0.0}
+    assert world.wake_up()
     assert world.set_posture("Stand", 1.0)
     assert not world.fallen()
 

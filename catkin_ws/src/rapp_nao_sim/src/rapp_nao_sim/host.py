@@ -13,8 +13,11 @@ from rapp_nao_sim.files import Files
 from rapp_nao_sim.modules.audio_device import ALAudioDevice
 from rapp_nao_sim.modules.audio_player import ALAudioPlayer
 from rapp_nao_sim.modules.audio_recorder import ALAudioRecorder
+from rapp_nao_sim.modules.battery import ALBattery
+from rapp_nao_sim.modules.body_senses import BodySenses
 from rapp_nao_sim.modules.memory import ALMemory
 from rapp_nao_sim.modules.sim_world import SimWorld
+from rapp_nao_sim.modules.sonar import ALSonar
 from rapp_nao_sim.modules.speech_recognition import ALSoundDetection, ALSpeechRecognition
 from rapp_nao_sim.modules.text_to_speech import ALTextToSpeech
 from rapp_nao_sim.modules.video_device import ALVideoDevice
@@ -39,7 +42,8 @@ class Host:
         self._ears = Ears() if config.microphone == "sound" else None
         self._mixer = Mixer(config.ambient)
         self._room = Room(self._mixer)
-        self._memory = ALMemory(self._session.service)
+        self._senses = BodySenses(self._world) if self._world is not None else None
+        self._memory = ALMemory(self._session.service, self._senses)
         speaking = threading.Event()
         self._hearing = Hearing(self._memory.insertData, self._memory.raiseEvent, self._ears, speaking)
         self._sim_world = SimWorld(self._mixer, self._hearing, config.person_level, self._ears is None, self._world)
@@ -48,9 +52,11 @@ class Host:
     def start(self) -> int:
         """Start everything; gives the port of NAOqi. Raises StartError, WorldError."""
         config, undo = self._config, self._undo
-        if self._world is not None:
+        if self._world is not None and self._senses is not None:
             self._world.start()
-            undo.callback(self._world.close)
+            undo.callback(self._senses.close)
+            undo.callback(self._world.close)  # before the senses, which wait for what it tells
+            self._senses.start(self._memory.insertData, self._memory.raiseEvent)
         self._listen()
         undo.callback(self._session.close)
         for part in (self._hearing, self._mouth, self._room):
@@ -89,7 +95,10 @@ class Host:
         }
         if self._world is None:
             return modules
-        return modules | motion_modules(self._world) | {"ALVideoDevice": ALVideoDevice(self._world)}
+        world = self._world
+        seeing = {"ALVideoDevice": ALVideoDevice(world)}
+        feeling = {"ALSonar": ALSonar(world), "ALBattery": ALBattery(world)}
+        return modules | motion_modules(world) | seeing | feeling
 
     def look_after(self) -> None:
         """Start ears that have died anew. Raises StartError when the body has died: the robot cannot go on without."""

@@ -2,15 +2,36 @@
 
 import logging
 import threading
-from collections.abc import Callable
-from typing import Any
+from collections import deque
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, Protocol
 
 import qi
 
-from rapp_nao_sim.naoqi import Module, NaoqiError, quick
+from rapp_nao_sim.naoqi import Module, NaoqiError, quick, working
 
 _log = logging.getLogger(__name__)
 Fetch = Callable[[str], Any]
+
+
+class Source(Protocol):
+    """Keys that are read fresh."""
+
+    def names(self) -> Collection[str]:
+        """The keys."""
+        ...
+
+    def read(self) -> Mapping[str, Any]:
+        """All of them with their values."""
+        ...
+
+
+class _Nothing:
+    def names(self) -> Collection[str]:
+        return ()
+
+    def read(self) -> Mapping[str, Any]:
+        return {}
 
 
 class Subscriber:
@@ -24,20 +45,38 @@ class Subscriber:
 class ALMemory(Module):
     """The robot's blackboard."""
 
-    def __init__(self, fetch: Fetch) -> None:
+    def __init__(self, fetch: Fetch, source: Source | None = None) -> None:
         self.__fetch = [fetch]  # in a list: qi would expose a bare callable attribute
+        self.__source: list[Source] = [source or _Nothing()]
         self.__lock = threading.RLock()
         self.__values: dict[str, Any] = {}
         self.__subscribers: dict[str, Subscriber] = {}
         self.__modules: dict[str, dict[str, str]] = {}
+        self.__news: dict[str, deque[tuple[str, str, Any]]] = {}  # what is to be told to modules, while a thread tells it
 
-    @quick
+    @working
     def getData(self, key: str) -> Any:  # noqa: N802
         """The value of a key; an error when nobody has set it."""
+        source = self.__source[0]
+        if key in source.names():
+            return source.read()[key]
         with self.__lock:
             if key not in self.__values:
                 raise NaoqiError(f"data not found: {key}")
             return self.__values[key]
+
+    @working
+    def getListData(self, keys: list[str]) -> list[Any]:  # noqa: N802
+        """The values of keys at one moment; None for one that nobody has set."""
+        source = self.__source[0]
+        fresh = source.read() if any(key in source.names() for key in keys) else {}
+        with self.__lock:
+            return [fresh.get(key, self.__values.get(key)) for key in keys]
+
+    def insertListData(self, pairs: list[tuple[str, Any]]) -> None:  # noqa: N802
+        """Set keys without telling their subscribers."""
+        for key, value in pairs:
+            self.insertData(key, value)
 
     def insertData(self, key: str, value: Any) -> None:  # noqa: N802
         """Set a key without telling its subscribers."""
@@ -52,7 +91,16 @@ class ALMemory(Module):
     def getDataListName(self) -> list[str]:  # noqa: N802
         """All keys."""
         with self.__lock:
-            return sorted(self.__values)
+            return sorted({*self.__values, *self.__source[0].names()})
+
+    def getDataList(self, part: str) -> list[str]:  # noqa: N802
+        """The keys that contain a text."""
+        return [key for key in self.getDataListName() if part in key]
+
+    def getEventList(self) -> list[str]:  # noqa: N802
+        """The keys that are events."""
+        with self.__lock:
+            return sorted(self.__subscribers)
 
     def declareEvent(self, key: str, *_extractor: str) -> None:  # noqa: N802
         """Make a key an event."""
@@ -65,7 +113,7 @@ class ALMemory(Module):
             modules = dict(self.__modules.get(key, {}))
         self.subscriber(key).signal(value)
         for module, method in modules.items():
-            threading.Thread(target=self.__tell, args=(module, method, key, value), daemon=True).start()
+            self.__queue(module, (method, key, value))
 
     def raiseMicroEvent(self, key: str, value: Any) -> None:  # noqa: N802
         """As raiseEvent."""
@@ -88,8 +136,24 @@ class ALMemory(Module):
             if self.__modules.get(key, {}).pop(module, None) is None:
                 raise NaoqiError(f"{module} is not subscribed to {key}")
 
-    def __tell(self, module: str, method: str, key: str, value: Any) -> None:
-        try:
-            self.__fetch[0](module).call(method, key, value, "")
-        except RuntimeError as error:
-            _log.warning("cannot tell %s of %s: %s", module, key, error)
+    def __queue(self, module: str, news: tuple[str, str, Any]) -> None:
+        """Have a module told, after all that it is still to be told."""
+        with self.__lock:
+            waiting = self.__news.get(module)
+            if waiting is not None:
+                waiting.append(news)
+                return
+            self.__news[module] = deque([news])
+        threading.Thread(target=self.__tell, args=(module,), daemon=True, name=f"news for {module}").start()
+
+    def __tell(self, module: str) -> None:
+        while True:
+            with self.__lock:
+                if not self.__news[module]:
+                    del self.__news[module]
+                    return
+                method, key, value = self.__news[module].popleft()
+            try:
+                self.__fetch[0](module).call(method, key, value, "")
+            except RuntimeError as error:
+                _log.warning("cannot tell %s of %s: %s", module, key, error)

@@ -6,7 +6,8 @@ from typing import Any
 
 import qi
 
-from rapp_nao_sim.naoqi import Module, NaoqiError, quick, working
+from rapp_nao_sim.modules.sim_body import SimBody
+from rapp_nao_sim.naoqi import NaoqiError, quick, working
 from rapp_nao_sim.sound.room import Mixer, Sounding
 from rapp_nao_sim.sound.samples import load
 from rapp_nao_sim.sound.synthesis import speak
@@ -18,13 +19,14 @@ LOUDEST = 16_000.0  # RMS of 16-bit samples; more noise would be cut off at full
 
 
 @qi.multiThreaded()
-class SimWorld(Module):
+class SimWorld(SimBody):
     """What happens in the room beside the robot. Signals: `robotSaid(text)`, `personSpoke(text)`.
 
     Calls overlap: what two people say at once is mixed at the microphone.
     """
 
     def __init__(self, mixer: Mixer, hearing: Hearing, level: float, text_fed: bool, world: WorldClient | None) -> None:
+        super().__init__(world)
         self.robotSaid = qi.Signal("(s)")
         self.personSpoke = qi.Signal("(s)")
         self.__mixer = mixer

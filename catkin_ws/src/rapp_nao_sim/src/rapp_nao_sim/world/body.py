@@ -6,19 +6,27 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rapp_nao_sim.world.model import BODY, JOINTS, SHAPES, SOLE
+import numpy as np
+import numpy.typing as npt
+
+from rapp_nao_sim.world.model import BODY, JOINTS, LINKS, SHAPES, SOLE
 from rapp_nao_sim.world.urdf import urdf, write_meshes
 
+Array = npt.NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]
 
 _GAIN = 0.3  # of pybullet's position motors; .1 to .6 stand alike
 _GEARS = 0.15  # share of its torque that the friction of a joint's gears holds without stiffness
 _REST = 0.002  # m/s
 _CLEARANCE = 0.0005  # m above the floor when the body is put down
+_GROUP = 64  # of pybullet's collision filter: the robot's own
+_GRAVITY = 9.81  # m/s²
 
 
 class Body:
     """The robot; joints are named as NAOqi does, angles are in rad, the world's frame in m."""
+
+    OTHERS = 0x7FFFFFFF & ~_GROUP  # mask of rays that pass through the robot
 
     def __init__(self, bullet: Any, looks: bool) -> None:
         self._bullet = bullet
@@ -36,6 +44,9 @@ class Body:
         for link in self._solid:
             # Anchored, or the robot creeps round by a degree every few seconds.
             bullet.changeDynamics(self._robot, link, lateralFriction=0.9, frictionAnchor=1)
+            bullet.setCollisionFilterGroupMask(self._robot, link, _GROUP, -1)
+        self._speed = (0.0, 0.0, 0.0)  # of the torso before the last step
+        self._pull = (0.0, 0.0, -_GRAVITY)
 
     def angles(self) -> dict[str, float]:
         """What the joints' sensors read."""
@@ -83,6 +94,37 @@ class Body:
         """Origin and orientation of a link's frame (not of its centre of mass)."""
         state = self._bullet.getLinkState(self._robot, self._links[link], computeForwardKinematics=1)
         return state[4], state[5]
+
+    def torso(self) -> tuple[Array, Array]:
+        """Origin and rotation matrix of the torso's frame."""
+        position, orientation = self.base()
+        rotation = np.array(self._bullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)
+        return np.array(position) - rotation @ np.array(LINKS["torso"].centre), rotation
+
+    def contacts(self, link: str) -> Any:
+        """pybullet's contact points between a link and the room."""
+        return self._bullet.getContactPoints(bodyA=self._robot, linkIndexA=self._links[link])
+
+    def loads(self) -> dict[str, float]:
+        """The motors' torques, Nm."""
+        states = self._bullet.getJointStates(self._robot, self._numbers)
+        return {name: float(state[3]) for name, state in zip(BODY, states, strict=True)}
+
+    def sense(self, seconds: float) -> None:
+        """What the accelerometer needs, after steps of the physics that took so long: m/s² of gravity less acceleration."""
+        (x, y, z), _ = self._bullet.getBaseVelocity(self._robot)
+        gained = [(new - old) / seconds for new, old in zip((x, y, z), self._speed, strict=True)]
+        self._speed, self._pull = (x, y, z), (-gained[0], -gained[1], -_GRAVITY - gained[2])
+
+    def inertia(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Of the torso, along its own axes: turning in rad/s, and the pull that the accelerometer shows in m/s²."""
+        _, rotation = self.torso()
+        _, turning = self._bullet.getBaseVelocity(self._robot)
+        return tuple((rotation.T @ turning).tolist()), tuple((rotation.T @ self._pull).tolist())
+
+    def tilt(self) -> float:
+        """Of the torso from upright."""
+        return math.acos(max(-1.0, min(1.0, self.up()[2])))
 
     def touches(self, other: int) -> bool:
         """Whether the robot touches or overlaps another body."""

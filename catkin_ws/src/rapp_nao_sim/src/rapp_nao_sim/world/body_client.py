@@ -1,10 +1,12 @@
 """Commands to the robot's body in the physics process, and what is asked of it."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 from rapp_nao_sim.world.errors import Refused
 from rapp_nao_sim.world.frames import Stance
+from rapp_nao_sim.world.keys import Feelings
 from rapp_nao_sim.world.worker import Worker
 
 MOVE_TIMEOUT = 30.0  # s, more than any movement at full speed takes, with its planning
@@ -75,7 +77,8 @@ class BodyClient:
         by `lift`; waits, and gives whether it arrived.
         """
         poses = [list(point) for point in points]
-        timeout = MOVE_TIMEOUT + WALK_PATIENCE * sum(abs(part) for pose in poses for part in pose) / share
+        far = sum(abs(part) for pose in poses for part in pose)
+        timeout = MOVE_TIMEOUT + (WALK_PATIENCE * far / share if math.isfinite(far) else 0.0)
         return bool(self._physics.call("walk_to", poses, share, lift, timeout=timeout))
 
     def walk_at(self, velocity: Sequence[float], share: float, lift: float) -> None:
@@ -142,6 +145,32 @@ class BodyClient:
     def push(self, force: Sequence[float], seconds: float = 0.1) -> None:
         """Push the torso with a force in N along the room's axes."""
         self._physics.call("push", list(force), seconds)
+
+    def feelings(self) -> Feelings:
+        """What the robot feels now; see `keys.values`."""
+        feelings: Feelings = self._physics.call("feelings")
+        return feelings
+
+    def events(self) -> list[tuple[str, Any]]:
+        """Wait for the next events of the senses (key of ALMemory, value), in their order; after a while there may be none."""
+        events: list[tuple[str, Any]] = self._physics.call("events")
+        return events
+
+    def touch(self, name: str, seconds: float) -> None:
+        """Touch one of `keys.TOUCHES` for a time; does not wait."""
+        self._physics.call("touch", name, seconds)
+
+    def set_charge(self, charge: float) -> None:
+        """Set the battery's charge from 0 to 1."""
+        self._physics.call("set_charge", charge)
+
+    def set_sonar(self, on: bool) -> None:
+        """Whether the sonars measure."""
+        self._physics.call("set_sonar", on)
+
+    def guard(self, what: str, on: bool) -> None:
+        """Whether "bumpers" stop the walk, and "falls" take the stiffness away."""
+        self._physics.call("guard", what, on)
 
     def _tuple(self, verb: str) -> tuple[float, float, float]:
         x, y, turn = self._physics.call(verb)

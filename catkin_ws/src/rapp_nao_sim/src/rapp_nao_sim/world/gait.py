@@ -94,7 +94,7 @@ class Gait:
         self._goals = self.feet  # after the step under way
         self.support = "R"
         self.standing = False
-        self._broken = False
+        self.broken = False
         self._angles = dict(angles)
         self._torso = stance.torso
         self._centre = legs.centre_of_mass(angles)  # in the torso's frame
@@ -117,7 +117,7 @@ class Gait:
 
     def stop(self) -> None:
         """Come to stand at once: put the lifted foot down and brake."""
-        self._broken = True
+        self.broken = True
 
     def middle(self) -> Pose:
         """Between the feet."""
@@ -134,9 +134,9 @@ class Gait:
     def _walk(self) -> Iterator[bool]:
         """The walk period by period; gives whether the legs are led by the places of torso and feet."""
         yield from self._rise()
-        if not self._broken:
+        if not self.broken:
             yield from self._shift()
-        while not self._broken:
+        while not self.broken:
             velocity = self._wish()
             if velocity is None:
                 yield from self._halt(_SETTLE, self._balance())
@@ -156,7 +156,7 @@ class Gait:
         self._xi = self._c.copy()
         ticks = math.ceil(max(abs(goal[name] - start[name]) for name in goal) / _RISING / self._period)
         for tick in range(1, ticks + 1):
-            if self._broken:
+            if self.broken:
                 return
             share = ease(tick / ticks)
             self._angles.update((name, start[name] + (angle - start[name]) * share) for name, angle in goal.items())
@@ -168,7 +168,7 @@ class Gait:
         growth = math.exp(self._w * time)
         pressure = (self._entry((0.0, 0.0, 0.0)) - growth * self._xi) / (1 - growth)
         for _ in range(round(time / self._period)):
-            if self._broken:
+            if self.broken:
                 return
             self._fall(pressure)
             self._stand()
@@ -182,7 +182,7 @@ class Gait:
         pressure, target = self._pressure(self.support, self.feet[self.support]), self._exit(velocity)
         ticks = round(style.step / self._period)
         for tick in range(1, ticks + 1):
-            if self._broken:
+            if self.broken:
                 return
             self._xi = pressure + math.exp(self._w * (tick - ticks) * self._period) * (target - pressure)
             self._c = self._c + self._period * self._w * (self._xi - self._c)

@@ -11,8 +11,8 @@ from rapp_nao_sim.world.body import Body
 from rapp_nao_sim.world.change import Change, upright
 from rapp_nao_sim.world.errors import Refused
 from rapp_nao_sim.world.frames import Stance
-from rapp_nao_sim.world.model import BODY, CHAINS, JOINTS, TWINS
-from rapp_nao_sim.world.moves import Track, clip, direct, posture_time, through
+from rapp_nao_sim.world.model import BODY, CHAINS
+from rapp_nao_sim.world.moves import Track, check, clip, direct, posture_time, through, twin
 from rapp_nao_sim.world.postures import LEAN_TOLERANCE, Posture, family, recognise
 from rapp_nao_sim.world.walk import Walk, ready
 
@@ -44,6 +44,7 @@ class Motion:
     def begin(self, name: str, feet: tuple[float, float], theta: float) -> None:
         """Put the robot in a posture at a place, at once."""
         posture = self._posture(name)
+        self.walk.abandon()
         self._body.put(posture.angles, upright(self._bullet, theta, posture.pitch), feet)
         self.targets = dict(posture.angles)
         self._moved = True
@@ -59,7 +60,7 @@ class Motion:
             self._finish(self._change)
         self._slip()
         if self.walk.active:
-            self.targets.update(self.walk.tick(seconds, self.targets, self._body.angles()))
+            self.targets.update(self.walk.tick(seconds, self.targets, self._body.angles(), self._tracks))
             self._moved = True
         self.quiet = not self._moved and not self.moving()
         if self._moved:
@@ -71,22 +72,22 @@ class Motion:
         """Send joints to angles at a fraction (0 to 1) of their greatest speed."""
         if not 0 < fraction <= 1:
             raise Refused(f"cannot move at {fraction:g} of the greatest speed; give more than 0 and at most 1")
-        _check(names, angles)
+        check(names, angles)
         self._spare(names)
         for name, angle in zip(names, angles, strict=True):
-            for joint in (name, *_twin(name)):
+            for joint in (name, *twin(name)):
                 self._replace(joint, direct(joint, self._now, self.targets[joint], clip(joint, angle), fraction))
 
     def move_joints(self, number: int, names: Sequence[str], goals: Ways, times: Ways) -> None:
         """Send joints through angles at times (s from now, rising); answers at the end, false when something stopped them."""
-        _check(names, goals, times)
+        check(names, goals, times)
         for name, way, when in zip(names, goals, times, strict=True):
             if not way or len(way) != len(when) or any(b <= a for a, b in zip((0.0, *when), when, strict=False)):
                 raise Refused(f"cannot move {name}: it needs as many rising times above 0 as angles")
         self._spare(names)
         joints: set[str] = set()
         for name, way, when in zip(names, goals, times, strict=True):
-            for joint in (name, *_twin(name)):
+            for joint in (name, *twin(name)):
                 self._replace(joint, through(self._now, self.targets[joint], [clip(joint, angle) for angle in way], when))
                 joints.add(joint)
         self._jobs[number] = joints
@@ -138,10 +139,10 @@ class Motion:
 
     def set_stiffness(self, names: Sequence[str], values: Sequence[float]) -> None:
         """Share of the motors' torque, 0 to 1."""
-        _check(names, values)
+        check(names, values)
         actual = self._body.angles()
         for name, value in zip(names, values, strict=True):
-            for joint in (name, *_twin(name)):
+            for joint in (name, *twin(name)):
                 if self.stiffness[joint] == 0:  # it may have sunk: it stiffens where it is
                     self.targets[joint] = actual[joint]
                 self.stiffness[joint] = min(1.0, max(0.0, float(value)))
@@ -155,7 +156,7 @@ class Motion:
 
     def stop_joints(self, names: Sequence[str]) -> None:
         """End the movement of joints here."""
-        _check(names)
+        check(names)
         for name in names:
             if self._tracks.pop(name, None) is not None:
                 self._fail(name)
@@ -167,13 +168,24 @@ class Motion:
             self._moved = True
             self._answer(change.number, False)
 
+    def collapse(self) -> None:
+        """End all movement and remove the stiffness at once."""
+        self.stop()
+        self.walk.abandon()
+        self.set_stiffness(BODY, [0.0] * len(BODY))
+
+    @property
+    def changing(self) -> bool:
+        """Whether a change of posture is under way."""
+        return self._change is not None
+
     def moving(self) -> bool:
         """Whether a command is under way."""
         return bool(self._tracks) or self._change is not None or self.walk.active
 
     def busy(self, names: Sequence[str]) -> bool:
         """Whether a command moves any of these joints."""
-        _check(names)
+        check(names)
         walking = self.walk.active and any(name in CHAINS["Legs"] for name in names)
         return self._change is not None or walking or any(name in self._tracks for name in names)
 
@@ -228,7 +240,6 @@ class Motion:
 
     def _replace(self, joint: str, track: Track) -> None:
         self._fail(joint)
-        self.walk.release([joint])
         self._tracks[joint] = track
 
     def _fail(self, joint: str) -> None:
@@ -274,17 +285,3 @@ class Motion:
         if name not in self._postures:
             raise Refused(f"cannot take posture {name!r}: known are {', '.join(self._postures)}")
         return self._postures[name]
-
-
-def _check(names: Sequence[str], *values: Sequence[object]) -> None:
-    """Refuse before anything moves."""
-    for name in names:
-        if name not in JOINTS:
-            raise Refused(f"cannot find joint {name!r}: known are {', '.join(BODY)}")
-    for row in values:
-        if len(row) != len(names):
-            raise Refused(f"cannot use {len(row)} values for {len(names)} joints: give one for each")
-
-
-def _twin(name: str) -> tuple[str, ...]:
-    return (TWINS[name],) if name in TWINS else ()

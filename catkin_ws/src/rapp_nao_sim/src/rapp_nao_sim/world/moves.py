@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rapp_nao_sim.world.model import JOINTS
+from rapp_nao_sim.world.errors import Refused
+from rapp_nao_sim.world.model import BODY, JOINTS, TWINS
 
 _POSTURE_SPEED = 0.3  # share of the joints' greatest speed used by posture changes at speed 1
 _LEAN_SPEED = 0.8  # rad/s of the torso in posture changes at speed 1
@@ -62,3 +63,18 @@ def posture_time(start: dict[str, float], goal: dict[str, float], lean: float, s
     """Seconds that a change of posture takes, the torso's lean changing by `lean` rad; speed from 0 to 1."""
     joints = max(abs(goal[name] - start[name]) / (_POSTURE_SPEED * JOINTS[name].speed) for name in goal)
     return max(_POSTURE_TIME, joints, abs(lean) / _LEAN_SPEED) / speed
+
+
+def check(names: Sequence[str], *values: Sequence[object]) -> None:
+    """Refuse unknown joints, and values that are not one for each joint, before anything moves."""
+    for name in names:
+        if name not in JOINTS:
+            raise Refused(f"cannot find joint {name!r}: known are {', '.join(BODY)}")
+    for row in values:
+        if len(row) != len(names):
+            raise Refused(f"cannot use {len(row)} values for {len(names)} joints: give one for each")
+
+
+def twin(name: str) -> tuple[str, ...]:
+    """The joint that the same motor drives, if any."""
+    return (TWINS[name],) if name in TWINS else ()

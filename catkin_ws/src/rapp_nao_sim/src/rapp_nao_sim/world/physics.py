@@ -17,6 +17,7 @@ from rapp_nao_sim.world.bullet import connect
 from rapp_nao_sim.world.errors import Invalid, Refused
 from rapp_nao_sim.world.furnishing import Furnishing
 from rapp_nao_sim.world.motion import Motion
+from rapp_nao_sim.world.senses import Senses
 from rapp_nao_sim.world.worker import WAIT, Service, serve
 
 STEP = 1 / 240  # s of one step of the physics
@@ -55,6 +56,7 @@ class Physics:
         self._furnishing = Furnishing(bullet, plan, self._body.touches, self._wake)
         self._motion = Motion(bullet, self._body, known, self._service.answer)
         self._motion.begin(name, (start.x, start.y), start.theta)
+        self._senses = Senses(bullet, self._body, self._motion, self._service.answer)
         self._service.offer(self._commands())
         return plan
 
@@ -101,6 +103,8 @@ class Physics:
             "push": self._push,
             "load_room": self._load_room,
             "snapshot": self._snapshot,
+            "events": later(self._senses.listen),
+            **self._senses.commands(),
             **self._furnishing.commands(),
         }
 
@@ -123,6 +127,10 @@ class Physics:
                     break
 
     def _tick(self) -> None:
+        self._step()
+        self._senses.tick(TICK)
+
+    def _step(self) -> None:
         if not self._motion.tick(TICK):
             self._still = 0
             return
@@ -134,6 +142,7 @@ class Physics:
                 self._body.push(force)
             self._pushes = [(force, left - STEP) for force, left in self._pushes if left > STEP]
             self._bullet.stepSimulation()
+        self._body.sense(TICK)
 
     def _fallen(self) -> bool:
         pitch, roll = self._body.lean()

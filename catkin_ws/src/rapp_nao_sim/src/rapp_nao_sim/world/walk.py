@@ -1,7 +1,7 @@
 """Walking: leads the gait to goals by what the odometry says, or at a wished velocity; m, rad, s."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rapp_nao_sim.world.errors import Refused
@@ -47,6 +47,7 @@ class Walk:
         self._style = Style()
         self._velocity = _STILL  # of the step under way
         self._calm = 0  # steps on the spot
+        self._arrived: tuple[int, bool] | None = None  # the way that ends with this stand
         self._waiting: list[int] = []
         self._shoulders: dict[str, float] = {}  # angles that the arms swing about
         self._now = 0.0
@@ -57,6 +58,11 @@ class Walk:
     def active(self) -> bool:
         """Whether the legs are led by the walk."""
         return self._gait is not None or self._way is not None or self._wish != _STILL
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it comes to stand and shall not go on."""
+        return self._gait is not None and self._gait.broken and self._way is None and self._wish == _STILL
 
     def go(self, number: int, points: Sequence[Sequence[float]], share: float, lift: float) -> None:
         """Walk to poses seen from where the robot is now, at a share of full speed; answers when at the last."""
@@ -73,7 +79,8 @@ class Walk:
             way += sum(abs(part) / limit for part, limit in zip(gap, self._fastest, strict=True))
         self._way = _Way(number, [compose(here, pose) for pose in poses], self._now + _PATIENCE * way + _SLACK)
         if self._gait is None and len(poses) == 1 and _near(relative(_STILL, poses[0]), _THERE):
-            self._arrive(True)
+            self._way = None
+            self._answer(number, True)
 
     def drive(self, velocity: Sequence[float], share: float, lift: float) -> None:
         """Walk at a velocity, as far as the robot can, until told otherwise; zero comes to stand."""
@@ -116,14 +123,18 @@ class Walk:
         """Where the robot will be after the step under way, in the odometry's frame."""
         return self.odometry.pose if self._gait is None else self._gait.landing()
 
-    def tick(self, period: float, targets: Mapping[str, float], angles: Mapping[str, float]) -> dict[str, float]:
-        """Joints for the next period, from where the motors are told to be and what the sensors read."""
+    def tick(
+        self, period: float, targets: Mapping[str, float], angles: Mapping[str, float], taken: Collection[str]
+    ) -> dict[str, float]:
+        """Joints for the next period, from where the motors are told to be and what the sensors read. Others have taken some."""
         self._now += period
         if self._gait is None:
             self.odometry.begin(angles)
             self._velocity, self._calm = _STILL, 0
             self._gait = Gait(targets, Stance.of(targets, self.odometry.pose), self._choose, period, self._style)
             self._shoulders = {name: targets[name] for name in _SHOULDERS if name in self._swinging}
+        for name in self._shoulders.keys() & taken:
+            del self._shoulders[name]  # until the next walk
         gait = self._gait
         self.odometry.follow(gait.support, angles)
         joints = gait.tick(targets)
@@ -131,11 +142,6 @@ class Walk:
             self._gait = None
             self._tell()
         return joints | self._arms(gait)
-
-    def release(self, joints: Sequence[str]) -> None:
-        """Let others have joints of the arms until the next walk."""
-        for name in joints:
-            self._shoulders.pop(name, None)
 
     def _choose(self) -> Pose | None:
         """The velocity of the next step, none to come to stand."""
@@ -149,7 +155,8 @@ class Walk:
             return self._velocity
         self._calm = 0
         if self._way is not None:
-            self._arrive(_near(relative(self.odometry.pose, self._way.points[-1]), _PASSED))
+            self._arrived = (self._way.number, _near(relative(self.odometry.pose, self._way.points[-1]), _PASSED))
+            self._way = None
         return None
 
     def _towards(self, way: _Way) -> Pose:
@@ -171,15 +178,18 @@ class Walk:
         """Forget where to walk."""
         self._wish = _STILL
         if self._way is not None:
-            self._arrive(False)
+            self._answer(self._way.number, False)
+            self._way = None
+        self._tell_arrival()
 
-    def _arrive(self, reached: bool) -> None:
-        assert self._way is not None
-        number, self._way = self._way.number, None
-        self._answer(number, reached)
-        self._tell()
+    def _tell_arrival(self) -> None:
+        if self._arrived is not None:
+            self._answer(*self._arrived)
+            self._arrived = None
 
     def _tell(self) -> None:
+        if self._gait is None:
+            self._tell_arrival()
         if not self.active:
             waiting, self._waiting = self._waiting, []
             for number in waiting:
