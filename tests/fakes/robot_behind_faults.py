@@ -56,6 +56,16 @@ class RobotBehindFaults(WholeRobot):
                 return self.until(wanted, since, AGAIN)
         raise AssertionError(f"{text!r} was not heard\n{self.story(since)}")
 
+    def command(self, text: str) -> int:
+        """The person says a whole sentence, again when it was not heard; gives where the story of it begins."""
+        since = len(self.seen)
+        for _ in range(4):
+            self.room("personSay", text, "en-us+m3", {"speed": 200.0})
+            with suppress(AssertionError):
+                self.until(entered("s5"), since, 5.0)
+                return since
+        raise AssertionError(f"{text!r} was not heard\n{self.story(since)}")
+
     def wait_for(self, done: Callable[[], bool]) -> None:
         """Wait for something that the robot does not publish."""
         deadline = time.monotonic() + PATIENCE
@@ -71,12 +81,12 @@ class RobotBehindFaults(WholeRobot):
         """Ask for a RApp; it says `words` and ends, and the robot listens again."""
         since = len(self.seen)
         self.ask(keyword)
-        self.until(lambda seen: seen.kind == "said" and seen.detail == words, since)
-        self.until_listening(since)
+        said = self.until(lambda seen: seen.kind == "said" and seen.detail == words, since)
+        self.until_listening(self.seen.index(said))
 
     def refused(self, since: int) -> str:
         """What the robot says in s11 on its way back to s3, within the bound."""
         deadline = time.monotonic() + BOUND
         said = self.until(lambda seen: (seen.kind, seen.state) == ("said", "s11"), since, BOUND)
-        self.until_listening(since, max(0.1, deadline - time.monotonic()))
+        self.until_listening(self.seen.index(said), max(0.1, deadline - time.monotonic()))
         return said.detail

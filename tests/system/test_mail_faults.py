@@ -80,8 +80,7 @@ def dictate(robot: RobotBehindFaults) -> str:
     robot.ask("e-mail")
     robot.until(entered("s32", "dynamic"), since)
     robot.say_until("Elizabeth", lambda seen: entered("s33", "dynamic")(seen), since)
-    robot.until(entered("s10"), since)
-    robot.until_listening(since)
+    robot.until_listening(robot.seen.index(robot.until(entered("s10"), since)))
     return [seen.detail for seen in robot.seen[since:] if (seen.kind, seen.state) == ("said", "s9")][-1]
 
 
@@ -143,6 +142,6 @@ def test_the_link_killed_while_it_sends_is_asked_again_and_the_mail_comes_once(r
     robot.wait_for(lambda: len(delivered(robot)) == 1)
     robot.kill("link")
     robot.start("link")
-    robot.until(lambda seen: (seen.kind, seen.detail) == ("said", SENT), since)
-    robot.until_listening(since)
+    said = robot.until(lambda seen: (seen.kind, seen.detail) == ("said", SENT), since)
+    robot.until_listening(robot.seen.index(said))
     assert wait_sent(robot)

@@ -22,7 +22,6 @@ listening_round = 1.0
 catalogue_again = 1.0
 """
 PERSON = "en-us+m3"
-BRISK = {"speed": 200.0}  # words a minute
 PLAY = "play a game with me"
 QUIET, LOUD = 60.0, 1500.0  # RMS of the room's noise; speech has about 2000
 
@@ -53,14 +52,6 @@ def states(robot: RobotBehindFaults, since: int) -> list[str]:
     return [seen.state for seen in robot.seen[since:] if seen.kind == "entered" and seen.machine == "core"]
 
 
-def command(robot: RobotBehindFaults, text: str) -> int:
-    """The person says a whole sentence; gives where the story of it begins."""
-    since = len(robot.seen)
-    robot.room("personSay", text, PERSON, BRISK)
-    robot.until(entered("s5"), since)
-    return since
-
-
 @pytest.mark.parametrize("word", ["xylophone", ""], ids=["a word outside the vocabulary", "silence"])
 def test_nothing_happens(robot: RobotBehindFaults, word: str) -> None:
     robot.served("fine", "fine")
@@ -74,13 +65,13 @@ def test_nothing_happens(robot: RobotBehindFaults, word: str) -> None:
 
 
 def test_a_long_command_that_fits_nothing(robot: RobotBehindFaults) -> None:
-    since = command(robot, "the old castle stands on a hill above the town")
+    since = robot.command("the old castle stands on a hill above the town")
     assert robot.refused(since) == NOT_UNDERSTOOD
     assert states(robot, since) == ["s5", "s11", "s3"]
 
 
 def asked_which(robot: RobotBehindFaults) -> int:
-    since = command(robot, "would you please play a game with me")
+    since = robot.command("would you please play a game with me")
     question = robot.until(lambda seen: (seen.state, seen.kind) == ("s12", "said"), since).detail
     assert question in ("Do you mean chess or draughts?", "Do you mean draughts or chess?")
     return since
@@ -89,8 +80,8 @@ def asked_which(robot: RobotBehindFaults) -> int:
 def test_a_long_command_that_fits_two_is_asked_about_and_the_answer_runs(robot: RobotBehindFaults) -> None:
     since = asked_which(robot)
     robot.say_until("draughts", entered("s6"), since)
-    robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "draughts"), since)
-    robot.until_listening(since)
+    said = robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "draughts"), since)
+    robot.until_listening(robot.seen.index(said))
     assert states(robot, since) == ["s5", "s12", "s6", "s7", "s8", "s9", "s10", "s3"]
 
 
@@ -106,8 +97,7 @@ def test_a_question_without_a_useful_answer_is_given_up(robot: RobotBehindFaults
 def test_a_recipient_not_understood_three_times(robot: RobotBehindFaults) -> None:
     since = len(robot.seen)
     robot.ask("e-mail")
-    robot.until(entered("end", "dynamic"), since)
-    robot.until_listening(since)
+    robot.until_listening(robot.seen.index(robot.until(entered("s10"), since)))
     said = [seen.detail for seen in robot.seen[since:] if (seen.kind, seen.state) == ("said", "s9")]
     again = "I did not understand the name, please say it again"
     assert said == ["starting word recognition", again, again, "I am sorry, I do not know to whom I should write"]
@@ -122,7 +112,7 @@ def hearing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RobotBehindFau
     robot.microphone = "sound"
     try:
         robot.start()
-        robot.until_listening()
+        hears_hello(robot)
         yield robot
     finally:
         robot.close()
@@ -142,10 +132,10 @@ def hears_hello(robot: RobotBehindFaults) -> None:
     for _ in range(5):
         robot.room("personSay", "hello", PERSON)
         try:
-            robot.until(lambda seen: seen.kind == "said" and seen.detail.startswith("hello Maria"), since, 4.0)
+            said = robot.until(lambda seen: seen.kind == "said" and seen.detail.startswith("hello Maria"), since, 4.0)
         except AssertionError:
             continue
-        robot.until_listening(since)
+        robot.until_listening(robot.seen.index(said))
         return
     raise AssertionError(robot.story(since))
 

@@ -45,7 +45,8 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RobotBehindFault
         robot.served(NAME, "fresh 1.0.0")
         shutil.copytree(robot.data / "tuf", folder / "old")
         open_shelf(robot.data).publish(build(package(folder / "two", "2.0.0")))
-        robot.served(NAME, "fresh 2.0.0")
+        ran = robot.say_until(NAME, lambda seen: (seen.kind, seen.detail) == ("said", "fresh 2.0.0"), len(robot.seen))
+        robot.until_listening(robot.seen.index(ran))
         yield robot
     finally:
         robot.close()

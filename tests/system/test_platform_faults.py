@@ -150,10 +150,9 @@ def test_a_store_that_answers_wrongly(robot: RobotBehindFaults, prefix: str, fau
     ("fault", "words"), [("slow", AWAY), ("cut", AWAY), ("no JSON", ODD), ("500", ODD)], ids=lambda value: value
 )
 def test_an_interpreter_that_answers_wrongly(robot: RobotBehindFaults, fault: str, words: str) -> None:
-    since = begin(robot)
+    begin(robot)
     robot.cloud_line.set("/hop/interpret", FAULTS[fault])
-    robot.room("personSay", "would you be so kind and run the fresh one", "en-us+m3", {"speed": 230.0})
-    robot.until(entered("s5"), since)
+    since = robot.command("would you be so kind and run the fresh one")
     assert robot.refused(since) == words
     robot.cloud_line.mend()
 
