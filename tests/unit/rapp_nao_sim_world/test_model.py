@@ -104,4 +104,4 @@ def test_a_shell_is_closed_and_of_the_size_asked_for() -> None:
             for one, other in zip(line[1:], [*line[2:], line[1]], strict=True):
                 edges[one, other] = edges.get((one, other), 0) + 1
     # Only the rims at the two poles, where all vertices are one point, are open.
-    assert sum((other, one) not in edges for one, other in edges) == 2 * 20
+    assert sum((other, one) not in edges for one, other in edges) == 2 * 28

@@ -28,11 +28,11 @@ class Body:
 
     OTHERS = 0x7FFFFFFF & ~_GROUP  # mask of rays that pass through the robot
 
-    def __init__(self, bullet: Any, looks: bool) -> None:
+    def __init__(self, bullet: Any, looks: bool, own_view: bool = False) -> None:
         self._bullet = bullet
         with tempfile.TemporaryDirectory(prefix="rapp-nao-") as folder:
             path = Path(folder) / "nao.urdf"
-            path.write_text(urdf(write_meshes(Path(folder)) if looks else None))
+            path.write_text(urdf(write_meshes(Path(folder), own_view) if looks else None))
             self._robot: int = bullet.loadURDF(str(path), (0, 0, 1))
         infos = [bullet.getJointInfo(self._robot, number) for number in range(bullet.getNumJoints(self._robot))]
         self._number = {info[1].decode(): int(info[0]) for info in infos}

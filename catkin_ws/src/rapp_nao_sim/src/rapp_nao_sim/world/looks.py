@@ -14,7 +14,8 @@ COLOURS = {
     "orange": (0.95, 0.42, 0.06),
     "blue": (0.30, 0.78, 0.98),
 }
-_AROUND, _ALONG = 20, 10  # faces of a shell; the robot's cameras draw them all for each picture
+_FACES = (28, 16)  # of a shell: around, along
+_OWN_FACES = (12, 6)  # as the robot's cameras see it, which draw them all for each picture
 
 
 @dataclass(frozen=True)
@@ -87,8 +88,17 @@ _LEFT = {
 }
 
 
+def shells(own_view: bool = False) -> Iterator[tuple[str, Look, str]]:
+    """Every shell: the name of its link, its look, its mesh. In the robot's own view it has no head, which holds its cameras."""
+    for link, look in looks():
+        if not own_view:
+            yield link, look, mesh(look)
+        elif link not in ("Head", "Neck"):
+            yield link, look, mesh(look, _OWN_FACES)
+
+
 def looks() -> Iterator[tuple[str, Look]]:
-    """Every shell with the name of its link."""
+    """Every look with the name of its link."""
     for link, shells in _CENTRAL.items():
         for shell in shells:
             yield link, shell
@@ -105,14 +115,15 @@ def _power(value: float, exponent: float) -> float:
     return math.copysign(abs(value) ** exponent, value)
 
 
-def mesh(look: Look) -> str:
+def mesh(look: Look, faces_of: tuple[int, int] = _FACES) -> str:
     """The shell about its centre as Wavefront OBJ text, with normals, so that it is shaded smoothly."""
+    around, along = faces_of
     vertices, normals, faces = [], [], []
     a, b, c = look.half
-    for i in range(_ALONG + 1):
-        latitude = -math.pi / 2 + math.pi * i / _ALONG
-        for j in range(_AROUND):
-            longitude = 2 * math.pi * j / _AROUND
+    for i in range(along + 1):
+        latitude = -math.pi / 2 + math.pi * i / along
+        for j in range(around):
+            longitude = 2 * math.pi * j / around
             ring, up = _power(math.cos(latitude), look.round), _power(math.sin(latitude), look.round)
             x, y = ring * _power(math.cos(longitude), look.round), ring * _power(math.sin(longitude), look.round)
             width = look.taper + (1 - look.taper) * (up + 1) / 2
@@ -125,11 +136,11 @@ def mesh(look: Look) -> str:
             )
             length = math.hypot(*normal)
             normals.append(tuple(part / length for part in normal))
-    for i in range(_ALONG):
-        for j in range(_AROUND):
-            low, high = i * _AROUND + j + 1, i * _AROUND + (j + 1) % _AROUND + 1
-            faces.append((low, high, high + _AROUND))
-            faces.append((low, high + _AROUND, low + _AROUND))
+    for i in range(along):
+        for j in range(around):
+            low, high = i * around + j + 1, i * around + (j + 1) % around + 1
+            faces.append((low, high, high + around))
+            faces.append((low, high + around, low + around))
     lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in vertices]
     lines += [f"vn {x:.5f} {y:.5f} {z:.5f}" for x, y, z in normals]
     lines += ["f " + " ".join(f"{k}//{k}" for k in face) for face in faces]

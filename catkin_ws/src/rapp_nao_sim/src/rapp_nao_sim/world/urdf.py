@@ -4,18 +4,18 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from rapp_nao_sim.world.looks import COLOURS, Look, looks, mesh
+from rapp_nao_sim.world.looks import COLOURS, Look, shells
 from rapp_nao_sim.world.model import JOINTS, LINKS, SHAPES, Joint, Link, Shape
 
 _Visuals = Mapping[str, Sequence[tuple[Path, Look]]]
 
 
-def write_meshes(folder: Path) -> dict[str, list[tuple[Path, Look]]]:
-    """Write the shells' meshes into a folder; gives for each link its meshes, to be passed to `urdf`."""
+def write_meshes(folder: Path, own_view: bool = False) -> dict[str, list[tuple[Path, Look]]]:
+    """Write the shells' meshes, as all or as the robot itself sees them, into a folder; gives for each link what `urdf` takes."""
     written: dict[str, list[tuple[Path, Look]]] = {}
-    for number, (link, look) in enumerate(looks()):
+    for number, (link, look, mesh) in enumerate(shells(own_view)):
         path = folder / f"{number}.obj"
-        path.write_text(mesh(look))
+        path.write_text(mesh)
         written.setdefault(link, []).append((path, look))
     return written
 
