@@ -138,6 +138,14 @@ def bodied(folder: Path) -> Iterator[Simulator]:
         yield start("--microphone", "text", "--voice", "silent", "--room", str(Path(__file__).with_name("seen.toml")))
 
 
+@pytest.fixture(scope="module")
+def bare(folder: Path) -> Iterator[Simulator]:
+    """A robot on a wide floor before a wall, that hears text and speaks silently."""
+    room = Path(__file__).parents[1] / "rapp_nao_sim_world" / "bare.toml"
+    with _simulating(folder) as start:
+        yield start("--microphone", "text", "--voice", "silent", "--room", str(room))
+
+
 @pytest.fixture(scope="session")
 def failing() -> Callable[..., Any]:
     """A call that must fail, with NAOqi's form of an error: "Module::method", below it what is wrong, no Python traceback."""

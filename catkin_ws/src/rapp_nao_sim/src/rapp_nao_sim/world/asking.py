@@ -37,6 +37,8 @@ class World(Protocol):
     def next_pose(self) -> tuple[float, float, float]: ...  # noqa: D102
     def stop_joints(self, names: Sequence[str]) -> None: ...  # noqa: D102
     def busy(self, names: Sequence[str]) -> bool: ...  # noqa: D102
+    def protect(self, side: str, on: bool) -> None: ...  # noqa: D102
+    def guard(self, what: str, on: bool) -> None: ...  # noqa: D102
     def stop_posture(self) -> None: ...  # noqa: D102
     def stop(self) -> None: ...  # noqa: D102
     def is_moving(self) -> bool: ...  # noqa: D102

@@ -168,6 +168,10 @@ class BodyClient:
         """Whether the sonars measure."""
         self._physics.call("set_sonar", on)
 
+    def protect(self, side: str, on: bool) -> None:
+        """Whether an arm ("L" or "R") is kept out of the body."""
+        self._physics.call("protect", side, on)
+
     def guard(self, what: str, on: bool) -> None:
         """Whether "bumpers" stop the walk, and "falls" take the stiffness away."""
         self._physics.call("guard", what, on)

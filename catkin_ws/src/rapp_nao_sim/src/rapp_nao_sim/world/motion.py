@@ -14,6 +14,7 @@ from rapp_nao_sim.world.frames import Stance
 from rapp_nao_sim.world.model import BODY, CHAINS
 from rapp_nao_sim.world.moves import Track, check, clip, direct, posture_time, through, twin
 from rapp_nao_sim.world.postures import LEAN_TOLERANCE, Posture, family, recognise
+from rapp_nao_sim.world.selfcollision import held
 from rapp_nao_sim.world.walk import Walk, ready
 
 _SETTLE = 0.3  # s of physics after a change, before it is judged
@@ -37,6 +38,7 @@ class Motion:
         self._change: Change | None = None
         self._moved = True
         self.walk = Walk(answer)
+        self.protected = set("LR")  # arms that are kept out of the body
         self.quiet = False  # nothing was commanded, and no limp joint gave way, in the last tick
         self.targets = body.angles()
         self.stiffness = dict.fromkeys(BODY, 1.0)
@@ -168,6 +170,10 @@ class Motion:
             self._moved = True
             self._answer(change.number, False)
 
+    def protect(self, side: str, on: bool) -> None:
+        """Whether an arm ("L" or "R") is kept out of the body."""
+        self.protected = self.protected | {side} if on else self.protected - {side}
+
     def collapse(self) -> None:
         """End all movement and remove the stiffness at once."""
         self.stop()
@@ -211,10 +217,14 @@ class Motion:
         return name, family(pitch, roll, self._body.hips())
 
     def _follow(self) -> None:
+        wanted = {name: track.at(self._now) for name, track in self._tracks.items() if self.stiffness[name] > 0}
+        for side in self.protected:
+            arm = wanted.keys() & CHAINS[f"{side}Arm"]
+            if arm and self._change is None and held(side, self.targets, self.targets | wanted):
+                wanted = {name: angle for name, angle in wanted.items() if name not in arm}
+        self._moved = self._moved or bool(wanted)
+        self.targets.update(wanted)
         for joint, track in list(self._tracks.items()):
-            if self.stiffness[joint] > 0:
-                self.targets[joint] = track.at(self._now)
-                self._moved = True
             if self._now >= track.end:
                 del self._tracks[joint]
                 self._arrived(joint)

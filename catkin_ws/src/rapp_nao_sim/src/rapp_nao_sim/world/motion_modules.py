@@ -12,10 +12,12 @@ from rapp_nao_sim.world.asking import World, asking
 from rapp_nao_sim.world.model import JOINTS
 from rapp_nao_sim.world.moves import Track
 from rapp_nao_sim.world.posture_module import ALRobotPosture
+from rapp_nao_sim.world.reflex_module import Reflexes
 from rapp_nao_sim.world.tracker_module import ALTracker
 from rapp_nao_sim.world.walk_module import Walking
 
 LONGEST = 60.0  # s, of one interpolation
+HAND_TIME = 0.8  # s to open or close a hand
 RAMP = 0.05  # s between two stiffnesses of an interpolation
 
 
@@ -25,11 +27,12 @@ def modules(world: World) -> dict[str, Any]:
 
 
 @qi.multiThreaded()
-class ALMotion(Walking):
+class ALMotion(Walking, Reflexes):
     """Joints and stiffness. Angles in rad, hands from 0 closed to 1 open, times in s."""
 
     def __init__(self, world: World) -> None:
-        super().__init__(world)
+        Walking.__init__(self, world)
+        Reflexes.__init__(self, world)
         self.__world = world
 
     @asking
@@ -116,6 +119,16 @@ class ALMotion(Walking):
         self.__world.move_joints(found, [[goal] for goal in goals], [[min(LONGEST, max(0.02, seconds / share))]] * len(found))
 
     @asking
+    def openHand(self, name: str) -> None:  # noqa: N802
+        """Open LHand or RHand, and wait."""
+        self.__world.move_joints(_hand(name), [[1.0]], [[HAND_TIME]])
+
+    @asking
+    def closeHand(self, name: str) -> None:  # noqa: N802
+        """Close LHand or RHand, and wait."""
+        self.__world.move_joints(_hand(name), [[0.0]], [[HAND_TIME]])
+
+    @asking
     def setStiffnesses(self, names: str | list[str], values: Any) -> None:  # noqa: N802
         """Set shares of the motors' torque, 0 to 1."""
         found = joints(names)
@@ -141,3 +154,9 @@ class ALMotion(Walking):
     def getStiffnesses(self, names: str | list[str]) -> list[float]:  # noqa: N802
         """Shares of the motors' torque, 0 to 1."""
         return self.__world.stiffnesses(joints(names))
+
+
+def _hand(name: str) -> list[str]:
+    if name not in ("LHand", "RHand"):
+        raise NaoqiError(f"cannot find hand {name!r}: known are LHand, RHand")
+    return [name]

@@ -91,6 +91,7 @@ class Physics:
             "swing_arms": motion.walk.swing,
             "planned_pose": motion.walk.planned_pose,
             "busy": motion.busy,
+            "protect": motion.protect,
             "odometry": lambda: motion.walk.odometry.pose,
             "stance": motion.stance,
             "next_pose": motion.walk.next_pose,
