@@ -31,14 +31,12 @@ def test_it_serves_until_it_is_interrupted() -> None:
 
 
 def test_the_room_is_photographed_as_told(tmp_path: Path) -> None:
-    means = []
-    for lamp in ("0", "1"):
-        done = rapp("--shot", str(tmp_path / "room.png"), "--lamp", lamp, "--door", "-0.3")
-        assert (done.returncode, done.stdout) == (0, f"the room is photographed in {tmp_path / 'room.png'}\n"), done.stderr
-        image = cv2.imread(str(tmp_path / "room.png"))
-        assert image is not None
-        means.append(image.mean())
-    assert means[0] < 0.7 * means[1]
+    done = rapp("--shot", str(tmp_path / "room.png"), "--lamp", "0", "--door", "-0.3")
+    assert (done.returncode, done.stdout) == (0, f"the room is photographed in {tmp_path / 'room.png'}\n"), done.stderr
+    image = cv2.imread(str(tmp_path / "room.png"))
+    assert image is not None
+    assert image.std() > 10
+    assert image.mean() < 100  # dark; with the lamp on it is about 160
 
 
 @pytest.mark.parametrize(
