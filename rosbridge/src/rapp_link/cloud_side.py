@@ -62,8 +62,10 @@ class Platform:
         """
         self._identity = identity
         await in_thread(self._write_down, identity)
-        self._wake.set()
-        return await self._register(identity, patience)
+        try:
+            return await self._register(identity, patience)
+        finally:
+            self._wake.set()  # from now on the background keeps it registered
 
     async def call(self, service: str, arguments: dict[str, Any], timeout: float, **files: Path) -> Any:
         """Call a service of the platform, registering again when it has been started anew; see `HopClient.call`."""
