@@ -83,7 +83,8 @@ def get_transform(name: str, space: int) -> NDArray[np.float64]:
 def action_client(name: str) -> Any:
     """An ordinary actionlib.SimpleActionClient of an action of the core agent.
 
-    There are rapp_move_to, rapp_move_along_path, rapp_take_predefined_posture and rapp_move_joint. Goals are made of rapp_msgs.msg, such as MoveToGoal; the action is the one of the function of the same name, with feedback and
-    cancel. A newer goal ends an older one that moves the same limbs.
+    There are rapp_move_to, rapp_move_along_path, rapp_take_predefined_posture and rapp_move_joint: the functions of the same names,
+    with feedback and cancel. Goals are made of rapp_msgs.msg, such as MoveToGoal. A newer goal ends an older one of the
+    same limbs.
     """
     return current().action_client(name)
