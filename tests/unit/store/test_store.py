@@ -101,9 +101,9 @@ def code(text: str) -> "np.ndarray[Any, Any]":
 
 
 def test_look_around_says_each_code_once_and_rests() -> None:
-    core = run("look_around", pictures=[code("kitchen"), code("kitchen"), code("door")])
+    core = run("look_around", pictures=[code('{"name": "kitchen"}')] * 2 + [code("door")])
     assert core.said() == ["I read: kitchen", "I read: door"]
-    assert [name for name, _ in core.calls if name == "look_at_point"] == ["look_at_point"] * 3
+    assert [name for name, _ in core.calls if name == "look_at_point"] == ["look_at_point"] * 6
     assert core.posture == "Crouch"
 
 

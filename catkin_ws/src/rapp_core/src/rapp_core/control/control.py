@@ -24,7 +24,7 @@ from rapp_core.trace import Happening, Trace
 _log = logging.getLogger(__name__)
 STEP = 0.05  # s between two looks at the dynamic agent
 HURRIED = 0.2  # s for a dynamic agent that did not end by itself to stop what it has started
-RESTING = 1.0  # s in which the robot is seen to begin to rest before the core agent leaves it
+RESTING = 0.3  # s in which the robot is seen to begin to rest before the core agent leaves it
 RETRY = 1.0  # s between tries to reach the robot
 DYNAMIC_KINDS = ("entered", "left", "failed")
 
