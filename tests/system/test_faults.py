@@ -67,6 +67,12 @@ def long_command(robot: WholeRobot) -> None:
     robot.until(entered("s5"), since)
 
 
+def ambiguous_command(robot: WholeRobot) -> None:
+    since = len(robot.seen)
+    robot.room("personSay", "please start one of the twins", "en-us+m3")
+    robot.until(entered("s12"), since)
+
+
 def restarting(state: str, holder: str) -> Reach:
     """Reaches a state that comes once, by starting the core agent anew; `holder` stands still, so that the state waits for it."""
 
@@ -94,6 +100,7 @@ STATES: dict[str, Reach] = {
     "s9 cloud call": in_service("caller", "dynamic->core rapp_cloud_call"),
     "s10": at("s10", "slow to end"),
     "s11": at("s11", "crasher"),
+    "s12": ambiguous_command,
 }
 
 
@@ -119,7 +126,9 @@ def rapps(folder: Path) -> list[Path]:
     slow_to_end = write_rapp(folder / "end", "slow_to_end", "pass", ("slow to end",))
     agent = slow_to_end / "agent.py"
     agent.write_text(agent.read_text() + SLOW_TO_END)
-    return [*made, fresh, slow_to_start, slow_to_end]
+    sentences = {"en": ["please start one of the twins"]}
+    twins = [write_rapp(folder / name, name, "pass", sentences=sentences) for name in ("castor", "pollux")]
+    return [*made, fresh, slow_to_start, slow_to_end, *twins]
 
 
 def suffer(robot: WholeRobot, state: str, name: str, how: str) -> Cell:
