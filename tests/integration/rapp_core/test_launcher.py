@@ -46,7 +46,7 @@ def test_a_run_from_first_word_to_gone(workshop):
     assert "hello from inside" in text
     assert outcome == "done"
     kinds = [message["type"] for message in workshop.heard if message["type"] != "state"]
-    assert kinds == ["first_word", "terminate", "gone"]
+    assert kinds == ["activate", "first_word", "terminate", "gone"]
     states = [m["state"] for m in workshop.heard if m["type"] == "state" and m["kind"] == "entered" and m["machine"] == "dynamic"]
     assert states == ["s1", "s2", "s3", "s4", "s5"]
 
