@@ -22,6 +22,7 @@ from rapp_core.ros.node import join, leave
 from rapp_core.ros.services import RosServices
 from rapp_core.services.context import Context
 from rapp_core.services.executor import Executor
+from rapp_core.services.keepsakes import Keepsakes
 from rapp_core.services.outside import Outside
 from rapp_core.services.table import CORE_SERVICES
 from rapp_core.trace import Trace
@@ -34,7 +35,7 @@ def main(url: str, token: str, folder: Path) -> None:
     connection = Connection(url, config.naoqi_timeout)
     join("body_half", stop)
     executor = Executor(Context(robot(connection, config), config, trace, folder))
-    RosServices(executor, Outside(RosHop(stop, trace), config, stop), lease, trace)
+    RosServices(executor, Outside(RosHop(stop, trace), config, stop), Keepsakes(config), lease, trace)
     RosActions(executor, lease, trace)
     permissions = {"core": [row.name for row in CORE_SERVICES], "cloud": []}
     package = write_rapp(folder / "run" / "package", "mover", permissions=permissions)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rapp_msgs.msg import MoveJointGoal, MoveToGoal, TakePostureGoal
 
-from rapp_api import Bug, Invalid, Pose, Refused, Unreachable, cloud, communication, navigation, vision
+from rapp_api import Bug, Invalid, Pose, Refused, Unreachable, cloud, communication, keepsakes, navigation, vision
 from rapp_api.core_agent import current
 from rapp_api.testing import FakeCoreAgent
 
@@ -146,3 +146,13 @@ def test_its_action_clients_carry_goals_out_at_once() -> None:
         client = navigation.action_client("rapp_move_to")
         client.send_goal(MoveToGoal(x=1.0))
         assert (client.get_state(), client.get_result().error) == (4, "refused")
+
+
+def test_what_is_kept_can_be_looked_at() -> None:
+    with FakeCoreAgent() as core:
+        assert keepsakes.keep("table.jpg", b"picture") == "/keepsakes/table.jpg"
+        assert core.kept == {"table.jpg": b"picture"}
+        with pytest.raises(Invalid, match="name a file"):
+            keepsakes.keep("../table.jpg", b"picture")
+        with pytest.raises(Refused, match="smaller"):
+            keepsakes.keep("big", bytes((8 << 20) + 1))

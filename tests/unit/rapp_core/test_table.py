@@ -16,7 +16,7 @@ from rapp_hop.hz.manifest import CORE_SERVICES as PERMITTED
 ROOT = Path(__file__).parents[3]
 MSGS = ROOT / "catkin_ws" / "src" / "rapp_msgs"
 MODULES = {"communication": communication, "navigation": navigation, "vision": vision}
-LEAVING_THE_ROBOT = {"CloudCall", "SendMail"}
+LEAVING_THE_RUN = {"CloudCall", "SendMail", "Keep"}
 NOT_OF_THE_CORE = {"HopRequest"}
 NOT_IN_THE_TABLE = {"rapp_say", "rapp_recognize", "rapp_record", "action_client"}
 """The paper's names of functions, and what makes a client."""
@@ -40,7 +40,7 @@ def action(row: CoreService) -> list[list[str]]:
 
 def test_every_service_of_the_contract_is_offered() -> None:
     offered = {row.srv for row in CORE_SERVICES}
-    assert offered | LEAVING_THE_ROBOT | NOT_OF_THE_CORE == {path.stem for path in MSGS.glob("srv/*.srv")}
+    assert offered | LEAVING_THE_RUN | NOT_OF_THE_CORE == {path.stem for path in MSGS.glob("srv/*.srv")}
 
 
 def test_every_action_of_the_contract_is_offered_and_has_a_client() -> None:
@@ -66,8 +66,8 @@ def test_a_name_is_that_of_its_type(row: CoreService) -> None:
 
 
 def test_a_package_can_be_permitted_what_is_offered_and_nothing_else() -> None:
-    outside = {"rapp_cloud_call", "rapp_send_mail"}
-    assert {row.name for row in CORE_SERVICES} | outside == PERMITTED
+    beside = {"rapp_cloud_call", "rapp_send_mail", "rapp_keep"}
+    assert {row.name for row in CORE_SERVICES} | beside == PERMITTED
 
 
 @rows

@@ -104,7 +104,7 @@ def test_p28_permissions(core: list[str]) -> None:
 
 def test_all_core_services_can_be_granted() -> None:
     found = read(manifest(permissions={"core": sorted(CORE_SERVICES)}))
-    assert len(found.permissions.core) == 21
+    assert len(found.permissions.core) == 22
 
 
 @pytest.mark.parametrize(

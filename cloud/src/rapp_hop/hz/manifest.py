@@ -24,11 +24,11 @@ MAX_PER_LANGUAGE = 64  # keywords or sentences
 RUNTIMES = ("python3",)
 _RAPP_KEYS = {"agent", "entry", "runtime", "keywords", "sentences", "permissions", "partner", "needs", "parameters"}
 
-# The core agent's services, deliverable §4.5 in the names of DESIGN §3.1: what a RApp may ask to use.
+# The core agent's services, deliverable §4.5 in the names of DESIGN §3.1, and `keep`: what a RApp may ask to use.
 CORE_SERVICES = frozenset(
     f"rapp_{name}"
     for name in (
-        *("say", "recognize", "record", "record_until_silence", "play_audio", "cloud_call", "send_mail"),
+        *("say", "recognize", "record", "record_until_silence", "play_audio", "cloud_call", "send_mail", "keep"),
         *("move_to", "move_vel", "move_stop", "move_joint", "take_predefined_posture", "look_at_point", "rest"),
         *("move_along_path", "set_global_pose", "get_robot_pose", "get_transform"),
         *("capture_image", "set_camera_param", "set_camera_params"),

@@ -78,6 +78,9 @@ class CoreAgent(Protocol):
     def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
         """Send a mail; gives "delivered", "kept" or "locked" (see `rapp_api.cloud.send_mail_wait`)."""
 
+    def keep(self, name: str, data: bytes) -> str:
+        """Keep a file beyond this run; gives where."""
+
     def pause(self, seconds: float) -> None:
         """Let time pass; the core agent is told that the dynamic agent means to wait."""
 

@@ -67,6 +67,10 @@ class RosCoreAgent(RosBody):
         fields = {"recipients": list(recipients), "subject": subject, "body": body, "attachment": attachment}
         return str(self._call("rapp_send_mail", "SendMail", **fields).state)
 
+    def keep(self, name: str, data: bytes) -> str:
+        """See `CoreAgent`."""
+        return str(self._call("rapp_keep", "Keep", name=name, data=data).path)
+
     def pause(self, seconds: float) -> None:
         """See `CoreAgent`."""
         until = time.monotonic() + seconds

@@ -7,6 +7,7 @@ assert ("say", "sending e-mail") in core.calls
 
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ from rapp_api.fake_body import FakeBody, Image
 
 Service = Any | Callable[[dict[str, Any]], Any]
 RECORDINGS = "/recordings"
+KEEPSAKES = "/keepsakes"
+KEPT_FILE = 8 << 20  # bytes of one kept file
 
 
 class FakeCoreAgent(FakeBody):
@@ -41,6 +44,7 @@ class FakeCoreAgent(FakeBody):
         self.calls: list[tuple[str, Any]] = []
         self.mails: list[dict[str, Any]] = []
         self.recordings: list[str] = []
+        self.kept: dict[str, bytes] = {}
         self.parameters: dict[str, Any] = {}
         self._hears = list(hears)
         self._services = dict(services or {})
@@ -135,6 +139,16 @@ class FakeCoreAgent(FakeBody):
         if isinstance(self._mail, RappError):
             raise self._mail
         return self._mail
+
+    def keep(self, name: str, data: bytes) -> str:
+        """Have it in `kept`."""
+        self._allow("rapp_keep", self._core)
+        _check(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", name) is not None, f"keep {name!r}: name a file such as table.jpg")
+        if len(data) > KEPT_FILE:
+            raise Refused(f"cannot keep {name}: it has {len(data)} bytes, {KEPT_FILE} are allowed; make it smaller")
+        self.calls.append(("keep", name))
+        self.kept[name] = data
+        return f"{KEEPSAKES}/{name}"
 
     def pause(self, seconds: float) -> None:
         """Note it; no time passes."""

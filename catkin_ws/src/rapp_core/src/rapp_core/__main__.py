@@ -29,6 +29,7 @@ from rapp_core.ros.state import StatePublisher
 from rapp_core.ros.topics.offer import streams
 from rapp_core.services.context import Context
 from rapp_core.services.executor import Executor
+from rapp_core.services.keepsakes import Keepsakes
 from rapp_core.services.outside import Outside
 from rapp_core.trace import Trace
 from rapp_ros.rejoin import Rejoining
@@ -74,7 +75,7 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     executor = Executor(context)
     platform = Platform(hop, config)
     control = Control(Parts(nao, hop, launcher, executor, platform, lease, trace, config, stop))
-    RosServices(executor, Outside(hop, config, stop), lease, trace)
+    RosServices(executor, Outside(hop, config, stop), Keepsakes(config), lease, trace)
     RosActions(executor, lease, trace)
     machine, rejoining = core_machine(control), Rejoining()
     machine.listen(trace.core_event)

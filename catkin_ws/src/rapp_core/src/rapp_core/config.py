@@ -24,6 +24,8 @@ class Limits:
     files: int = 256  # open files
     file_size: int = 64 << 20  # bytes of one file
     private: int = 64 << 20  # bytes of all files in its private folder, in memory
+    kept: int = 64 << 20  # bytes of all files the RApp has the core agent keep, of all its runs
+    kept_file: int = 8 << 20  # bytes of one of them
 
 
 @dataclass(frozen=True)

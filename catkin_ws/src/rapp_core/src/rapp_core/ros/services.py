@@ -11,6 +11,7 @@ from rapp_core.errors import CoreError, Refused
 from rapp_core.launcher.lease import Grant, Lease
 from rapp_core.ros.conversions import fields, fill
 from rapp_core.services.executor import Executor
+from rapp_core.services.keepsakes import Keepsakes
 from rapp_core.services.outside import Outside
 from rapp_core.services.table import CORE_SERVICES, CoreService
 from rapp_core.trace import Trace
@@ -23,15 +24,17 @@ OUTSIDE = frozenset({"rapp_cloud_call", "rapp_send_mail"})  # allowed call by ca
 class RosServices:
     """Advertises all services; they are withdrawn when the node leaves."""
 
-    def __init__(self, executor: Executor, outside: Outside, lease: Lease, trace: Trace) -> None:
+    def __init__(self, executor: Executor, outside: Outside, keepsakes: Keepsakes, lease: Lease, trace: Trace) -> None:
         self._executor = executor
         self._outside = outside
+        self._keepsakes = keepsakes
         self._lease = lease
         self._trace = trace
         for row in CORE_SERVICES:
             self._offer(row.name, row.srv, self._core(row))
         self._offer("rapp_cloud_call", "CloudCall", self._cloud_call)
         self._offer("rapp_send_mail", "SendMail", self._send_mail)
+        self._offer("rapp_keep", "Keep", self._keep)
 
     def _offer(self, name: str, srv: str, handler: Handler) -> None:
         cls = getattr(rapp_msgs.srv, srv)
@@ -68,6 +71,11 @@ class RosServices:
 
     def _send_mail(self, grant: Grant, request: Any, response: Any) -> None:
         response.state = self._outside.send_mail(grant.run, request.recipients, request.subject, request.body, request.attachment)
+
+    def _keep(self, grant: Grant, request: Any, response: Any) -> None:
+        path = self._keepsakes.keep(grant.run, request.name, request.data)
+        self._trace.note(f"kept {path}")
+        response.path = str(path)
 
 
 def allow(grant: Grant, name: str) -> None:
