@@ -26,7 +26,7 @@ def say(request):
     if request.text == "go": gate.set()
     if request.text == "fail": raise ValueError("no voice")
     if request.text == "die": import os; os._exit(0)
-    return SayResponse(True, request.text)
+    return SayResponse(success=True, message=request.text)
 
 rospy.Service("say", Say, say)
 latched = rospy.Publisher("latched", String, latch=True, queue_size=1); latched.publish("kept")
