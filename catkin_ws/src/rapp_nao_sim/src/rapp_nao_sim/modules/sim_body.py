@@ -30,6 +30,11 @@ class SimBody(Module):
         """Whether the robot lies without having been told to."""
         return self.__there().fallen()
 
+    @working
+    def takeTouched(self) -> list[str]:  # noqa: N802
+        """What of the room, but for the floor, the robot has touched since this was asked the last time: things, wall, door."""
+        return self.__there().take_touched()
+
     def __there(self) -> WorldClient:
         if self.__world is None:
             raise NaoqiError("there is no world: nao_sim was started with --no-world")

@@ -126,6 +126,10 @@ class Body:
         """Of the torso from upright."""
         return math.acos(max(-1.0, min(1.0, self.up()[2])))
 
+    def pressed(self) -> set[int]:
+        """Bodies that the robot's presses against, itself among them."""
+        return {point[2] for point in self._bullet.getContactPoints(bodyA=self._robot) if point[9] > 0}
+
     def touches(self, other: int) -> bool:
         """Whether the robot touches or overlaps another body."""
         return bool(self._bullet.getClosestPoints(self._robot, other, 0.0))

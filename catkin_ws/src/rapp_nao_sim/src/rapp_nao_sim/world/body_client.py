@@ -146,6 +146,11 @@ class BodyClient:
         """Push the torso with a force in N along the room's axes."""
         self._physics.call("push", list(force), seconds)
 
+    def take_touched(self) -> list[str]:
+        """What of the room, but for the floor, the robot has touched since this was asked the last time."""
+        touched: list[str] = self._physics.call("take_touched")
+        return touched
+
     def feelings(self) -> Feelings:
         """What the robot feels now; see `keys.values`."""
         feelings: Feelings = self._physics.call("feelings")

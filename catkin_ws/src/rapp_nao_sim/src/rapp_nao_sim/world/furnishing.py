@@ -36,6 +36,11 @@ class Furnishing:
         """What the renderer must know."""
         return {"door": self._door, "lamp": self._lamp, "places": dict(self._places)}
 
+    def names(self) -> dict[int, str]:
+        """What the room's solid bodies are called."""
+        assert self._scene is not None
+        return self._scene.names()
+
     def commands(self) -> dict[str, Callable[..., Any]]:
         """What the physics process offers."""
         return {

@@ -18,6 +18,7 @@ from rapp_nao_sim.world.errors import Invalid, Refused
 from rapp_nao_sim.world.furnishing import Furnishing
 from rapp_nao_sim.world.motion import Motion
 from rapp_nao_sim.world.senses import Senses
+from rapp_nao_sim.world.touching import Touching
 from rapp_nao_sim.world.worker import WAIT, Service, serve
 
 STEP = 1 / 240  # s of one step of the physics
@@ -57,6 +58,7 @@ class Physics:
         self._motion = Motion(bullet, self._body, known, self._service.answer)
         self._motion.begin(name, (start.x, start.y), start.theta)
         self._senses = Senses(bullet, self._body, self._motion, self._service.answer)
+        self._touching = Touching(self._body, self._furnishing.names)
         self._service.offer(self._commands())
         return plan
 
@@ -102,6 +104,7 @@ class Physics:
             "awake": motion.awake,
             "fallen": self._fallen,
             "push": self._push,
+            "take_touched": self._touching.take,
             "load_room": self._load_room,
             "snapshot": self._snapshot,
             "events": later(self._senses.listen),
@@ -143,6 +146,7 @@ class Physics:
                 self._body.push(force)
             self._pushes = [(force, left - STEP) for force, left in self._pushes if left > STEP]
             self._bullet.stepSimulation()
+        self._touching.tick()
         self._body.sense(TICK)
 
     def _fallen(self) -> bool:

@@ -24,8 +24,7 @@ class Scene:
         self._pictures = pictures
         self._built: list[int] = []
         self._shades: list[tuple[int, Cylinder]] = []
-        for wall in room.walls:
-            self._wall(wall)
+        self._walls = [self._wall(wall) for wall in room.walls]
         self._floor(room.floor)
         door = room.door
         half = (door.width / 2, door.thickness / 2, door.height / 2)
@@ -43,6 +42,11 @@ class Scene:
         """Take all of the room out of the world."""
         for body in self._built:
             self._bullet.removeBody(body)
+
+    def names(self) -> dict[int, str]:
+        """What the solid bodies but the floor are called: "wall", "door", or as the thing they are part of."""
+        found = dict.fromkeys(self._walls, "wall") | {self._leaf: "door"}
+        return found | {body: name for name, bodies in self._parts.items() for body in bodies if body is not None}
 
     def set_door(self, angle: float) -> list[int]:
         """Turn the door's leaf to an opening angle, rad; gives what has moved."""
@@ -99,11 +103,11 @@ class Scene:
             visual = bullet.createVisualShape(bullet.GEOM_CYLINDER, radius=size[0], length=size[1], **look)
         return self._body(shape, visual, centre, yaw)
 
-    def _wall(self, wall: Wall) -> None:
+    def _wall(self, wall: Wall) -> int:
         (x0, y0), (x1, y1) = wall.start, wall.end
         half = (math.dist(wall.start, wall.end) / 2, wall.thickness / 2, wall.height / 2)
         centre = ((x0 + x1) / 2, (y0 + y1) / 2, wall.bottom + wall.height / 2)
-        self._solid("box", half, centre, math.atan2(y1 - y0, x1 - x0), wall.colour)
+        return self._solid("box", half, centre, math.atan2(y1 - y0, x1 - x0), wall.colour)
 
     def _part(self, shape: Shape) -> int | None:
         """The body of a part, not yet at its place; the physics needs none for a picture."""
