@@ -85,8 +85,9 @@ def test_a_module_that_is_missing_is_refused_by_name(sim, connect):
 
 def test_a_folder_where_the_robot_may_not_write_is_refused(sim, connect, tmp_path_factory):
     _connection, nao = connect(sim())
+    nao.recorder.start(tmp_path_factory.mktemp("elsewhere") / "recording.ogg")
     with pytest.raises(Refused, match="cannot"):
-        nao.recorder.start(tmp_path_factory.mktemp("elsewhere") / "recording.ogg")
+        nao.recorder.stop()
 
 
 def test_the_order_of_figure_6_reaches_naoqi(sim, connect, wait_for):
