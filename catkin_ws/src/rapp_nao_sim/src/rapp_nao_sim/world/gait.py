@@ -24,6 +24,7 @@ _PUT_DOWN = 0.06  # s for a lifted foot when the walk is broken off
 _BRAKE = 0.16  # s for the body to come to rest then
 _SETTLE = 0.5  # s for the body to come to rest between the feet at the end of a walk
 _RISING = 1.2  # rad/s of the legs' joints when the body comes to the walk's height
+_SWAYING = 0.06  # m/s of the centre of mass meanwhile
 _BENT = {"LKneePitch": 0.9, "RKneePitch": 0.9}  # from where straight knees are sure to bend forwards
 _ROUNDS = 10
 _LEGS = CHAINS["Legs"]
@@ -147,14 +148,15 @@ class Gait:
 
     def _rise(self) -> Iterator[bool]:
         """Come upright to the walk's height, the weight between the feet, by the shortest way of the joints."""
-        start = dict(self._angles)
+        start, before = dict(self._angles), self._c
         for _ in range(_ROUNDS):  # the centre of mass moves with the legs
             self._c = self._balance()
             self._stand()
             goal = self._reach(start | _BENT, _ROUNDS)
             self._centre = legs.centre_of_mass(start | goal)
         self._xi = self._c.copy()
-        ticks = math.ceil(max(abs(goal[name] - start[name]) for name in goal) / _RISING / self._period)
+        joints = max(abs(goal[name] - start[name]) for name in goal) / _RISING
+        ticks = math.ceil(max(joints, float(np.linalg.norm(self._c - before)) / _SWAYING) / self._period)
         for tick in range(1, ticks + 1):
             if self.broken:
                 return
