@@ -1,1 +1,1 @@
-"""rosbridge v2 on ROS 1: protocol and session without I/O, rospy on one side, a Tornado WebSocket server on the other."""
+"""rosbridge v2 on ROS 1: protocol and session without I/O, ROS on one side, WebSocket clients on the other."""

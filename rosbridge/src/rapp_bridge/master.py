@@ -1,4 +1,4 @@
-"""Questions to the ROS master, as far as the bridge has any."""
+"""Questions to the ROS master (wiki.ros.org/ROS/Master_API, wiki.ros.org/ROS/Parameter Server API)."""
 
 from typing import Any
 from urllib.parse import urlsplit
@@ -6,9 +6,12 @@ from urllib.parse import urlsplit
 from rapp_bridge.errors import Unreachable
 from rapp_ros.master import MasterAwayError, ask
 
+Entries = list[tuple[str, list[str]]]
+"""Names and their nodes."""
+
 
 class Master:
-    """The ROS master's API, as far as the bridge needs it. Its methods block, from any thread, up to `timeout` seconds."""
+    """The ROS master. Its methods block, from any thread, up to `timeout` seconds, and raise Unreachable after that."""
 
     def __init__(self, uri: str, caller: str, timeout: float) -> None:
         self._uri = uri
@@ -25,14 +28,27 @@ class Master:
 
     def topic_type(self, name: str) -> str | None:
         """The type of a topic; None when nobody publishes or subscribes it."""
-        _, _, pairs = self._ask("getTopicTypes")
-        found = next((str(kind) for topic, kind in pairs if topic == name and kind != "*"), None)
+        found = next((kind for topic, kind in self.topic_types() if topic == name and kind != "*"), None)
         if found is None:
             return None
-        _, _, (publishers, subscribers, _) = self._ask("getSystemState")  # the master never forgets a type
+        publishers, subscribers, _ = self.state()  # the master never forgets a type
         return found if any(topic == name for topic, _ in [*publishers, *subscribers]) else None
 
-    def _ask(self, question: str, *words: str) -> tuple[int, str, Any]:
+    def topic_types(self) -> list[tuple[str, str]]:
+        """All topics that ever were, and their types; "*" when not known."""
+        return [(str(topic), str(kind)) for topic, kind in self._ask("getTopicTypes")[2]]
+
+    def state(self) -> tuple[Entries, Entries, Entries]:
+        """Publishers, subscribers and services."""
+        publishers, subscribers, services = self._ask("getSystemState")[2]
+        return publishers, subscribers, services
+
+    def param(self, question: str, *words: Any) -> tuple[bool, Any]:
+        """Ask the parameter server; gives whether it could, and its answer."""
+        code, _, value = self._ask(question, *words)
+        return code == 1, value
+
+    def _ask(self, question: str, *words: Any) -> tuple[int, str, Any]:
         try:
             return ask(self._uri, self._timeout, question, self._caller, *words)
         except MasterAwayError as error:

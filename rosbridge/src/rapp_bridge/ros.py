@@ -1,18 +1,19 @@
 """The ROS side as the sessions see it: carries out the effects of a session."""
 
-import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import rospy
 
-from rapp_bridge.blocking import Blocking
-from rapp_bridge.calls import Calls
+from rapp_bridge.calls import Calls, Done
 from rapp_bridge.client import Client
 from rapp_bridge.config import Config
-from rapp_bridge.conversion import arguments, writer
-from rapp_bridge.errors import Bug, Unreachable
-from rapp_bridge.offers import Offered, Offers, response_of
+from rapp_bridge.decoding import Raw, decode
+from rapp_bridge.encoding import encode_arguments
+from rapp_bridge.errors import BridgeError
+from rapp_bridge.forms import JSON, json_pieces
+from rapp_bridge.local import Locals
+from rapp_bridge.offers import Offers
 from rapp_bridge.protocol import (
     Advertise,
     AdvertiseService,
@@ -25,59 +26,68 @@ from rapp_bridge.protocol import (
     UnadvertiseService,
     Unsubscribe,
 )
-from rapp_bridge.topics import Topics
+from rapp_bridge.publications import Publications
+from rapp_bridge.subscriptions import Subscriptions
+
+Waiting = Awaitable[None] | None
+"""What is not done at once, because the master has to be asked, is to be awaited before the client's next message."""
 
 
 class Ros:
-    """What asks the master runs in threads, in order for each client; all else at once on the event loop."""
+    """All that clients can have done. Belongs to the event loop's thread."""
 
-    def __init__(self, config: Config, topics: Topics, calls: Calls, offers: Offers, blocking: Blocking) -> None:
+    def __init__(
+        self, config: Config, publications: Publications, subscriptions: Subscriptions, calls: Calls, offers: Offers, own: Locals
+    ) -> None:
         self._config = config
-        self._topics = topics
         self._calls = calls
         self._offers = offers
-        self._blocking = blocking
-        self._slow: dict[type, Callable[[Client, Any], None]] = {
-            Advertise: topics.advertise,
-            Unadvertise: topics.unadvertise,
-            Subscribe: topics.subscribe,
-            Unsubscribe: topics.unsubscribe,
+        self._own = own
+        self.publish: Callable[[Client, Publish], Waiting] = publications.publish
+        self._actions: dict[type, Callable[[Client, Any], Waiting]] = {
+            Advertise: publications.advertise,
+            Unadvertise: publications.unadvertise,
+            Subscribe: subscriptions.subscribe,
+            Unsubscribe: subscriptions.unsubscribe,
             AdvertiseService: offers.advertise,
             UnadvertiseService: offers.unadvertise,
+            ServiceResponse: offers.answer,
         }
 
-    async def perform(self, client: Client, effect: Message) -> None:
-        """Carry out any effect but a call; raises BridgeError."""
-        if isinstance(effect, ServiceResponse):
-            self._offers.answer(client, effect)
-        elif isinstance(effect, Publish):
-            if not self._topics.advertised(client, effect.topic):
-                await self._blocking.run(self._topics.advertise, client, Advertise(effect.topic, ""))
-            self._topics.publish(effect)
-        elif action := self._slow.get(type(effect)):
-            await self._blocking.run(action, client, effect)
-        else:
-            raise Bug(f"cannot perform {type(effect).__name__}: report this")
+    def perform(self, client: Client, effect: Message) -> Waiting:
+        """Carry out any effect but a publication or a call; raises BridgeError."""
+        return self._actions[type(effect)](client, effect)
 
-    async def call(self, wish: CallService) -> dict[str, Any]:
-        """Call a service, of a ROS node or of a client; gives the response's fields; raises BridgeError in bounded time."""
-        name = rospy.resolve_name(wish.service)
-        offered = self._offers.find(name)
-        if offered is None:
-            return await self._calls.call(name, wish.args, wish.timeout)
-        return await self._ask(name, offered, wish)
+    def call(self, client: Client, wish: CallService, done: Done) -> None:
+        """Call a service, of a ROS node, of a client, or of the bridge; `done` gets the outcome in bounded time."""
+        name = rospy.resolve_name(wish.service.partition("#")[0])
+        seconds = wish.timeout or self._config.call_timeout
+        if (own := self._own.find(name)) is not None:
+            self._ask(own.cls, wish, done, lambda request, answer: self._own.serve(own, request, client.access, answer))
+        elif (offered := self._offers.find(name)) is not None:
+            cls = offered.cls
+            self._ask(cls, wish, done, lambda request, answer: self._offers.ask(name, cls, request, seconds, answer))
+        else:
+            self._calls.call(name, wish.args, seconds, done)
 
     def abandon(self, client: Client) -> None:
         """The client is gone: who waits for its answers is told now; the session's closing effects do the rest."""
         self._offers.abandon(client)
 
-    async def _ask(self, name: str, offered: Offered, wish: CallService) -> dict[str, Any]:
-        seconds = wish.timeout or self._config.call_timeout
-        request = arguments(wish.args, offered.cls._request_class)
-        with self._offers.asking(name, offered, request) as answer:
+    @staticmethod
+    def _ask(cls: Any, wish: CallService, done: Done, serve: Callable[[Raw, Any], None]) -> None:
+        """Call a service within this process, with the same checks as one of ROS."""
+
+        def answer(outcome: bytes | bytearray | BridgeError) -> None:
+            if isinstance(outcome, BridgeError):
+                done(outcome)
+                return
             try:
-                response = await asyncio.wait_for(asyncio.wrap_future(answer), seconds)
-            except TimeoutError as error:
-                raise Unreachable(f"cannot wait longer for {name}: no answer in {seconds:g} s") from error
-        fields: dict[str, Any] = writer(offered.cls._response_class)(response_of(name, response, offered.cls))
-        return fields
+                done(json_pieces(decode(outcome, cls._response_class, JSON)))
+            except BridgeError as error:
+                done(error)
+
+        try:
+            serve(encode_arguments(wish.args, cls._request_class), answer)
+        except BridgeError as error:
+            done(error)

@@ -1,20 +1,27 @@
-"""The WebSocket side: Tornado connections, each with a session and a bounded queue."""
+"""Connections of clients: each has a session, and serves its messages in order."""
 
 import asyncio
 import logging
-import threading
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
-from tornado.httputil import HTTPServerRequest
-from tornado.web import Application
-from tornado.websocket import WebSocketClosedError, WebSocketHandler
-
+from rapp_bridge.access import EVERYTHING, Access, Gate
+from rapp_bridge.arrival import Background
+from rapp_bridge.clock import now
 from rapp_bridge.config import Config
-from rapp_bridge.errors import BridgeError, Bug
-from rapp_bridge.outbox import Outbox
-from rapp_bridge.protocol import CallService
+from rapp_bridge.effects import Close, Effect, Limits, Send
+from rapp_bridge.errors import BridgeError
+from rapp_bridge.forms import Piece
+from rapp_bridge.protocol import CallService, Level, Message, Publish
 from rapp_bridge.ros import Ros
-from rapp_bridge.session import Effect, Send, Session
+from rapp_bridge.sender import Sender
+from rapp_bridge.session import Session
+from rapp_bridge.websocket import CLOSE, NORMAL, PING, POLICY, PONG, TOO_BIG, Reader, Received, ViolationError, frame
+
+TURN = 0.002  # s that one client's messages are served before others get their turn
+BACKLOG = 1024  # messages read ahead of those that are served
 
 _log = logging.getLogger(__name__)
 
@@ -25,137 +32,234 @@ class Hall:
 
     config: Config
     ros: Ros
-    leaving: set[asyncio.Task[None]] = field(default_factory=set)  # of clients that are gone: their undoing
+    gate: Gate
+    resolve: Callable[[str], str]
+    background: Background
+    changed: Callable[[], None]  # called when a client has come or gone
+    clients: dict["Connection", tuple[str, tuple[int, int]]] = field(default_factory=dict)  # to address and time of coming
+    sockets: set[Any] = field(default_factory=set)  # all transports, those in their handshake too
+    working: set[asyncio.Task[None]] = field(default_factory=set)  # for clients, those that are gone too
+
+    def limits(self) -> Limits:
+        """What a client may hold."""
+        config = self.config
+        return Limits(config.names, config.calls, config.frame_limit, config.fragment_timeout)
+
+    def work(self, coroutine: Any) -> None:
+        """Run it; what goes wrong in it is logged."""
+        task = asyncio.get_running_loop().create_task(coroutine)
+        self.working.add(task)
+        task.add_done_callback(self._worked)
+
+    def _worked(self, task: asyncio.Task[None]) -> None:
+        self.working.discard(task)
+        if not task.cancelled() and (error := task.exception()):
+            _log.error("work for a client", exc_info=error)
 
 
-class Connection(WebSocketHandler):
-    """One client. Its frames are served in order; the next one is read when the last has been served or begun."""
+class Connection(asyncio.Protocol):
+    """One client. A message that has to wait for the ROS master keeps the client's next ones waiting, nobody else's."""
 
-    def initialize(self, hall: Hall) -> None:  # noqa: D102
+    def __init__(self, hall: Hall, transport: Any, access: Access | None) -> None:
+        """`access`: who the client is, when it has shown that in the handshake."""
         self._hall = hall
-
-    def check_origin(self, origin: str) -> bool:
-        """Any origin, as upstream; the bridge listens on the loopback interface."""
-        return True
-
-    def open(self, *_args: str, **_kwargs: str) -> None:
-        """Begin a session."""
-        self.set_nodelay(True)
-        config = self._hall.config
+        self._transport = transport
         self._loop = asyncio.get_running_loop()
-        self._thread = threading.get_ident()
-        self._more = asyncio.Event()
-        self._outbox = Outbox(config.queue_limit, self._wake, self._overflow)
-        self._session = Session(config.names, config.calls)
-        self._order = asyncio.Lock()
-        self._calls: set[asyncio.Task[None]] = set()
-        self._writing = asyncio.create_task(self._write())
+        config = hall.config
+        self._session = Session(hall.limits(), hall.gate, hall.resolve, access)
+        self._sender = Sender(transport, config.queue_limit, hall.background, self.tell)
+        self._reader = Reader(config.frame_limit)
+        self._received: deque[Received] = deque()
+        self._busy = self._turn_is_set = self._over = self._gone = False
+        self._second, self._count = 0.0, 0  # of the rate limit
+        self._heard = True
+        self._timer = self._loop.call_later(config.entry_timeout, self._entry_is_over)
+        self.send, self.offer = self._sender.send, self._sender.offer
+        self.when_caught_up, self.give_up = self._sender.when_caught_up, self._sender.give_up
+        self._enter()
 
-    async def on_message(self, message: str | bytes) -> None:
-        """Serve one frame."""
-        async with self._order:
-            await self._carry_out(self._session.receive(message))
+    # The socket's events
 
-    def on_close(self) -> None:
-        """End the session, and undo in order what it left behind."""
-        self._outbox.close()
-        self._writing.cancel()
-        for call in self._calls:
-            call.cancel()
-        self._hall.ros.abandon(self)
-        leaving = asyncio.create_task(self._leave())
-        self._hall.leaving.add(leaving)
-        leaving.add_done_callback(self._hall.leaving.discard)
-
-    def send(self, frame: bytes) -> None:
-        """Queue an answer or a request, from any thread."""
-        self._outbox.keep(frame)
-
-    def offer(self, topic: str, frame: bytes, queue_length: int) -> None:
-        """Queue a topic's message, from any thread."""
-        self._outbox.offer(topic, frame, queue_length)
-
-    async def _carry_out(self, effects: list[Effect]) -> None:
-        for effect in effects:
-            if isinstance(effect, Send):
-                self.send(effect.frame)
-            elif isinstance(effect, CallService):
-                self._begin(effect)
-            else:
-                try:
-                    await self._hall.ros.perform(self, effect)
-                except BridgeError as error:
-                    await self._carry_out(self._session.failed(effect, error))
-
-    def _begin(self, wish: CallService) -> None:
-        task = asyncio.create_task(self._call(wish))
-        self._calls.add(task)
-        task.add_done_callback(lambda done: self._ended(done, wish))
-
-    async def _call(self, wish: CallService) -> None:
-        try:
-            effects = self._session.answered(wish, await self._hall.ros.call(wish))
-        except BridgeError as error:
-            effects = self._session.failed(wish, error)
-        await self._carry_out(effects)
-
-    def _ended(self, task: asyncio.Task[None], wish: CallService) -> None:
-        self._calls.discard(task)
-        error = None if task.cancelled() else task.exception()
-        if error is not None:
-            _log.error("call of %s", wish.service, exc_info=error)
-            for effect in self._session.failed(wish, Bug(f"cannot call {wish.service}: the bridge failed; see its log")):
-                if isinstance(effect, Send):
-                    self.send(effect.frame)
-
-    async def _leave(self) -> None:
-        async with self._order:
-            for effect in self._session.close():
-                if isinstance(effect, Send):
-                    continue
-                try:
-                    await self._hall.ros.perform(self, effect)
-                except BridgeError as error:
-                    _log.warning("a client that left: %s", error)
-
-    def _wake(self) -> None:
-        if threading.get_ident() == self._thread:
-            self._more.set()
-        elif not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._more.set)
-
-    def _overflow(self) -> None:
-        if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._disconnect)
-
-    def _disconnect(self) -> None:
-        _log.warning("client disconnected: more than %d bytes of answers waited for it", self._hall.config.queue_limit)
-        self._writing.cancel()
-        self.close(1008, "too slow")
-
-    async def _write(self) -> None:
-        try:
-            while True:
-                frame = self._outbox.take()
-                if frame is None:
-                    await self._more.wait()
-                    self._more.clear()
-                else:
-                    await self.write_message(frame)
-        except WebSocketClosedError:
+    def data_received(self, data: bytes) -> None:
+        """Bytes have come."""
+        if self._over:
             return
+        self._heard = True
+        try:
+            received = self._reader.feed(data)
+            self._count_rate(len(received))
+        except ViolationError as error:
+            if error.code in (POLICY, TOO_BIG):
+                self.tell("error", str(error))
+            self.close(error.code, str(error))
+            return
+        self._received.extend(received)
+        self._serve()
 
+    def eof_received(self) -> bool:
+        """The client sends no more; it is closed from this side too."""
+        return False
 
-def application(hall: Hall) -> Application:
-    """The web application: a WebSocket on every path, as upstream."""
-    return Application(
-        [(r"/.*", Connection, {"hall": hall})],
-        websocket_max_message_size=hall.config.frame_limit,
-        websocket_ping_interval=hall.config.ping_interval,
-        websocket_ping_timeout=hall.config.ping_interval,
-        log_function=_no_access_log,
-    )
+    def connection_lost(self, _error: Exception | None) -> None:
+        """The client is gone: end the session, and undo in order what it left behind."""
+        self._gone = self._over = True
+        self._timer.cancel()
+        self._received.clear()
+        self._sender.close()
+        self._hall.sockets.discard(self._transport)
+        if self._hall.clients.pop(self, None) is not None:
+            self._hall.changed()
+        self._hall.ros.abandon(self)
+        if not self._busy:
+            self._hall.work(self._undo(self._session.close()))
 
+    def pause_writing(self) -> None:
+        """The client reads more slowly than it is sent to."""
+        self._sender.pause()
 
-def _no_access_log(_handler: HTTPServerRequest) -> None:
-    """Access lines would be noise: a client's failures are told to the client."""
+    def resume_writing(self) -> None:
+        """The client has caught up."""
+        self._sender.resume()
+
+    # What the ROS side uses, beside what is the sender's
+
+    @property
+    def access(self) -> Access:
+        """What the client may use."""
+        return self._session.access or EVERYTHING
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether much waits for the client."""
+        return self._sender.is_behind
+
+    def tell(self, level: Level, text: str) -> None:
+        """Send a status, if the client wants those of this level."""
+        self._do(self._session.tell(level, text))
+
+    def close(self, code: int, reason: str) -> None:
+        """Say farewell; a client that does not answer it is cut off."""
+        if not self._over:
+            self._over = True
+            self._sender.farewell(code, reason)
+            self._timer.cancel()
+            self._timer = self._loop.call_later(self._hall.config.entry_timeout, self._transport.abort)
+
+    # How long it may be silent
+
+    def _enter(self) -> None:
+        """The client counts as connected once it has shown who it is."""
+        if self not in self._hall.clients and self._session.access is not None:
+            self._timer.cancel()
+            self._timer = self._loop.call_later(self._hall.config.ping_interval, self._ping)
+            address = self._transport.get_extra_info("peername") or ("", 0)
+            self._hall.clients[self] = (address[0], now())
+            self._hall.changed()
+
+    def _entry_is_over(self) -> None:
+        self.close(POLICY, "not authenticated in time")
+
+    def _ping(self) -> None:
+        if not self._heard:
+            self._transport.abort()
+            return
+        self._heard = False
+        self._timer = self._loop.call_later(self._hall.config.ping_interval, self._ping)
+        self.send(frame(PING, [b""]))
+
+    # What the client sends
+
+    def _count_rate(self, count: int) -> None:
+        now = self._loop.time()
+        if now - self._second >= 1.0:
+            self._second, self._count = now, 0
+        self._count += count
+        if self._count > self._hall.config.frame_rate:
+            limit = self._hall.config.frame_rate
+            raise ViolationError(POLICY, f"cannot serve more than {limit} messages a second; send fewer")
+
+    def _serve(self) -> None:
+        """Serve what has come, in order, until something has to be waited for, or others have their turn."""
+        end, count = self._loop.time() + TURN, 0
+        while self._received and not self._busy and not self._over:
+            count += 1
+            if count & 15 == 0 and self._loop.time() > end:
+                self._take_turn_later()
+                break
+            self._take(self._received.popleft())
+        if not self._over:
+            self._read_on(len(self._received) < BACKLOG)
+
+    def _take_turn_later(self) -> None:
+        if not self._turn_is_set:
+            self._turn_is_set = True
+            self._loop.call_soon(self._turn)
+
+    def _turn(self) -> None:
+        self._turn_is_set = False
+        self._serve()
+
+    def _read_on(self, wanted: bool) -> None:
+        if self._transport.is_reading() != wanted:
+            (self._transport.resume_reading if wanted else self._transport.pause_reading)()
+
+    def _take(self, received: Received) -> None:
+        if received.opcode < CLOSE:
+            self._do(self._session.receive(received.data, self._loop.time()))
+            if self not in self._hall.clients:
+                self._enter()
+        elif received.opcode == PING:
+            self.send(frame(PONG, [received.data]))
+        elif received.opcode == CLOSE:
+            self.close(NORMAL, "")
+
+    def _do(self, effects: list[Effect]) -> None:
+        for effect in effects:
+            if type(effect) is Send:
+                self.send(effect.frame)
+            elif type(effect) is Close:
+                self.close(effect.code, effect.reason)
+            else:
+                self._perform(effect)  # type: ignore[arg-type]  # mypy does not narrow by type()
+
+    def _perform(self, effect: Message) -> None:
+        try:
+            if type(effect) is Publish:
+                waiting = self._hall.ros.publish(self, effect)
+            elif type(effect) is CallService:
+                self._hall.ros.call(self, effect, lambda outcome: self._answered(effect, outcome))
+                return
+            else:
+                waiting = self._hall.ros.perform(self, effect)
+        except BridgeError as error:
+            self._do(self._session.failed(effect, error))
+            return
+        if waiting is not None:
+            self._busy = True
+            self._hall.work(self._wait(effect, waiting))
+
+    async def _wait(self, effect: Message, waiting: Any) -> None:
+        try:
+            await waiting
+        except BridgeError as error:
+            self._do(self._session.failed(effect, error))
+        finally:
+            self._busy = False
+            if self._gone:
+                self._hall.work(self._undo(self._session.close()))
+            else:
+                self._serve()
+
+    def _answered(self, wish: CallService, outcome: list[Piece] | BridgeError) -> None:
+        if not self._gone:
+            failed = isinstance(outcome, BridgeError)
+            self._do(self._session.failed(wish, outcome) if failed else self._session.answered(wish, outcome))  # type: ignore[arg-type]
+
+    async def _undo(self, effects: list[Effect]) -> None:
+        for effect in effects:
+            try:
+                waiting = self._hall.ros.perform(self, effect)  # type: ignore[arg-type]  # a session closes with messages only
+                if waiting is not None:
+                    await waiting
+            except BridgeError as error:
+                _log.warning("a client that left: %s", error)

@@ -1,122 +1,129 @@
-"""A connection to a ROS service, kept for many calls (TCPROS, wiki.ros.org/ROS/TCPROS), on asyncio.
+"""TCPROS (wiki.ros.org/ROS/TCPROS), pure: connection headers, and messages out of a stream of bytes."""
 
-rospy's own ServiceProxy knows no time-out and takes a thread per waiting call; here both come from the event loop.
-"""
-
-import asyncio
-import io
 import struct
-from typing import Any
 
-import genpy
-
-from rapp_bridge.conversion import service_class
-from rapp_bridge.errors import Invalid, Refused, Unreachable
+from rapp_bridge.decoding import Raw
+from rapp_bridge.errors import Invalid
 
 HEADER_LIMIT = 1 << 20  # bytes
-
-
-class ServiceConnection:
-    """One persistent connection; one call at a time. After an error or a cancelled call it must be closed."""
-
-    def __init__(self, name: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, limit: int) -> None:
-        self._name = name
-        self._reader = reader
-        self._writer = writer
-        self._limit = limit
-        self.type: Any = None
-
-    @classmethod
-    async def open(cls, name: str, address: tuple[str, int], caller: str, limit: int) -> "ServiceConnection":
-        """Connect and learn the service's type from it; `limit`: bytes of a response.
-
-        Raises Unreachable, or Invalid when the type is not built here.
-        """
-        try:
-            reader, writer = await asyncio.open_connection(*address)
-        except OSError as error:
-            raise Unreachable(f"cannot call {name}: {error}; its node is gone") from error
-        connection = cls(name, reader, writer, limit)
-        try:
-            connection.type = await connection._shake_hands(caller)
-        finally:
-            if connection.type is None:
-                connection.close()
-        return connection
-
-    @property
-    def usable(self) -> bool:
-        """Whether the other side still holds the connection, as far as is known."""
-        return not self._reader.at_eof() and not self._writer.is_closing()
-
-    def close(self) -> None:
-        """Close it; a call in progress on the other side goes on there."""
-        self._writer.close()
-
-    async def call(self, request: Any) -> Any:
-        """Call with a request message; gives the response message.
-
-        Raises Refused when the service answers with an error, Invalid when the request does not fit its type, Unreachable.
-        """
-        frame = _serialized(request)
-        try:
-            self._writer.write(frame)
-            await self._writer.drain()
-            done, size = struct.unpack("<BI", await self._reader.readexactly(5))
-            if size > self._limit:
-                raise Refused(f"cannot take the answer of {self._name}: {size} bytes, more than {self._limit}")
-            body = await self._reader.readexactly(size)
-        except (OSError, asyncio.IncompleteReadError) as error:
-            raise Unreachable(f"cannot know what became of the call of {self._name}: its node closed the connection") from error
-        if not done:
-            raise Refused(f"cannot call {self._name}: it answered with an error: {body.decode(errors='replace')}")
-        try:
-            return self.type._response_class().deserialize(body)
-        except genpy.DeserializationError as error:
-            raise Invalid(f"cannot read the answer of {self._name}: {error}") from error
-
-    async def _shake_hands(self, caller: str) -> Any:
-        self._writer.write(encode_header({"service": self._name, "md5sum": "*", "callerid": caller, "persistent": "1"}))
-        try:
-            (size,) = struct.unpack("<I", await self._reader.readexactly(4))
-            if size > HEADER_LIMIT:
-                raise Unreachable(f"cannot call {self._name}: what listens there speaks no TCPROS")
-            fields = decode_header(await self._reader.readexactly(size))
-        except (OSError, asyncio.IncompleteReadError, struct.error) as error:
-            raise Unreachable(f"cannot call {self._name}: its node closed the connection") from error
-        if "type" not in fields:
-            raise Unreachable(f"cannot call {self._name}: {fields.get('error', 'its node does not say its type')}")
-        found = service_class(fields["type"])
-        if fields.get("md5sum", found._md5sum) != found._md5sum:
-            raise Invalid(f"cannot call {self._name}: its {fields['type']} is another version than the one built here")
-        return found
-
-
-def _serialized(message: Any) -> bytes:
-    buffer = io.BytesIO(b"\0\0\0\0")
-    buffer.seek(4)
-    try:
-        message.serialize(buffer)
-    except (genpy.SerializationError, struct.error) as error:
-        raise Invalid(f"cannot call with these arguments: {error}") from error
-    buffer.seek(0)
-    buffer.write(struct.pack("<I", len(buffer.getbuffer()) - 4))
-    return buffer.getvalue()
+SCRATCH = 1 << 18  # bytes read at once
+_LENGTH = struct.Struct("<I")
 
 
 def encode_header(fields: dict[str, str]) -> bytes:
-    """A TCPROS connection header with its length in front."""
+    """A connection header with its length in front."""
     lines = [f"{name}={value}".encode() for name, value in fields.items()]
-    body = b"".join(struct.pack("<I", len(line)) + line for line in lines)
-    return struct.pack("<I", len(body)) + body
+    body = b"".join(_LENGTH.pack(len(line)) + line for line in lines)
+    return _LENGTH.pack(len(body)) + body
 
 
-def decode_header(body: bytes) -> dict[str, str]:
-    """The fields of a TCPROS connection header, given without its length; raises struct.error when it is cut."""
+def decode_header(body: Raw) -> dict[str, str]:
+    """The fields of a connection header, given without its length; raises Invalid when it is cut."""
     fields: dict[str, str] = {}
-    while body:
-        (size,) = struct.unpack_from("<I", body)
-        name, _, value = body[4 : 4 + size].decode(errors="replace").partition("=")
+    position = 0
+    while position < len(body):
+        if position + 4 > len(body):
+            raise Invalid("cannot read a connection header that is cut")
+        (size,) = _LENGTH.unpack_from(body, position)
+        line = bytes(body[position + 4 : position + 4 + size])
+        if len(line) < size:
+            raise Invalid("cannot read a connection header that is cut")
+        name, _, value = line.decode(errors="replace").partition("=")
         fields[name] = value
-        body = body[4 + size :]
+        position += 4 + size
     return fields
+
+
+class HeaderReader:
+    """A connection header out of the first bytes of a stream."""
+
+    def __init__(self) -> None:
+        self._data = b""
+
+    def feed(self, data: bytes) -> tuple[dict[str, str], bytes] | None:
+        """The header's fields and what came after it, when it is complete; raises Invalid."""
+        self._data += data
+        if len(self._data) < 4:
+            return None
+        (size,) = _LENGTH.unpack_from(self._data)
+        if size > HEADER_LIMIT:
+            raise Invalid("cannot read a connection header so long: this is no TCPROS")
+        if len(self._data) < 4 + size:
+            return None
+        return decode_header(self._data[4 : 4 + size]), self._data[4 + size :]
+
+
+class Splitter:
+    """Messages with their lengths in front, out of a stream that is read into buffers given by `buffer`.
+
+    A large message is read into its own place, so that it is not copied again. With `has_status`, as for the responses of
+    services, one byte stands before each length and comes out as the first byte of the message.
+    """
+
+    def __init__(self, limit: int, *, has_status: bool = False) -> None:
+        """`limit`: bytes of one message."""
+        self.limit = limit
+        self._extra = 1 if has_status else 0
+        self._scratch = bytearray(SCRATCH)
+        self._view = memoryview(self._scratch)
+        self._have = 0
+        self._large: bytearray | None = None
+        self._filled = 0
+
+    def buffer(self) -> memoryview:
+        """Where to read the next bytes to."""
+        if self._large is not None:
+            return memoryview(self._large)[self._filled :]
+        return self._view[self._have :]
+
+    def filled(self, count: int) -> list[Raw]:
+        """So many bytes were read; gives the messages that are complete. Raises Invalid when one is longer than the limit."""
+        if self._large is not None:
+            self._filled += count
+            if self._filled < len(self._large):
+                return []
+            large, self._large = self._large, None
+            return [large]
+        self._have += count
+        return self._split()
+
+    def feed(self, data: bytes) -> list[Raw]:
+        """As `filled`, for bytes that were read elsewhere."""
+        messages: list[Raw] = []
+        rest = memoryview(data)
+        while rest:
+            place = self.buffer()
+            count = min(len(place), len(rest))
+            place[:count] = rest[:count]
+            messages += self.filled(count)
+            rest = rest[count:]
+        return messages
+
+    def _split(self) -> list[Raw]:
+        messages: list[Raw] = []
+        scratch, position, end, extra = self._scratch, 0, self._have, self._extra
+        while end - position >= 4 + extra:
+            (size,) = _LENGTH.unpack_from(scratch, position + extra)
+            if size > self.limit:
+                raise Invalid(f"cannot take a message of {size} bytes; {self.limit} is the limit")
+            start = position + 4 + extra
+            if start + size > end:
+                if 4 + extra + size > SCRATCH // 2:
+                    self._begin_large(position, start, size)
+                    return messages
+                break
+            body = bytes(self._view[start : start + size])
+            messages.append(bytes(scratch[position : position + 1]) + body if extra else body)
+            position = start + size
+        if position:
+            scratch[: end - position] = scratch[position:end]
+            self._have = end - position
+        return messages
+
+    def _begin_large(self, position: int, start: int, size: int) -> None:
+        """Read what is left of a large message into a place of its own."""
+        extra, have = self._extra, self._have - start
+        self._large = bytearray(extra + size)
+        self._large[:extra] = self._scratch[position : position + extra]
+        self._large[extra : extra + have] = self._view[start : self._have]
+        self._filled, self._have = extra + have, 0

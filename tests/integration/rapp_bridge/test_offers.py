@@ -98,9 +98,7 @@ def test_who_offers_a_name_again_takes_it_over(clients: Clients, peer: Peer) -> 
         (True, [], "an object is needed"),
     ],
 )
-def test_an_answer_that_is_off_is_an_error_of_the_call(
-    clients: Clients, peer: Peer, result: bool, values: Any, heard: str
-) -> None:
+def test_an_answer_that_is_off_is_an_error_of_the_call(clients: Clients, peer: Peer, result: bool, values: Any, heard: str) -> None:
     async def story() -> str:
         async with clients:
             provider = await offer(clients, "/failing")

@@ -1,0 +1,66 @@
+"""The WebSocket handshake: whom the bridge lets in."""
+
+import asyncio
+from typing import Any
+
+from rapp_bridge import handshake
+from rapp_bridge.errors import Refused
+from rapp_bridge.handshake import TurnedAwayError
+from rapp_bridge.server import Connection, Hall
+
+
+class Doorway(asyncio.Protocol):
+    """A connection until its handshake is done; it has a bounded time, and a bounded number of others beside it."""
+
+    def __init__(self, hall: Hall) -> None:
+        self._hall = hall
+        self._head = b""
+
+    def connection_made(self, transport: Any) -> None:
+        """A client has connected."""
+        self._transport = transport
+        config = self._hall.config
+        self._hall.sockets.add(transport)
+        self._timer = asyncio.get_running_loop().call_later(config.entry_timeout, self._is_late)
+        if len(self._hall.sockets) > config.clients:
+            self._turn_away(TurnedAwayError("503 Service Unavailable", "cannot serve more clients; try again later"))
+
+    def connection_lost(self, _error: Exception | None) -> None:
+        """The client is gone before it was let in."""
+        self._timer.cancel()
+        self._hall.sockets.discard(self._transport)
+
+    def data_received(self, data: bytes) -> None:
+        """Take the request's head, and hand over to a connection when it is good."""
+        self._head += data
+        end = self._head.find(handshake.END)
+        try:
+            if end < 0:
+                if len(self._head) > handshake.LIMIT:
+                    raise TurnedAwayError("431 Request Header Fields Too Large", "cannot read so long a request")
+                return
+            self._let_in(handshake.answer(self._head[:end], self._hall.config.origin), self._head[end + len(handshake.END) :])
+        except TurnedAwayError as error:
+            self._turn_away(error)
+        except Refused as error:
+            self._turn_away(TurnedAwayError("401 Unauthorized", str(error)))
+
+    def _let_in(self, accepted: handshake.Accepted, rest: bytes) -> None:
+        gate = self._hall.gate
+        access = None if accepted.token is None or gate.is_open else gate.by_token(accepted.token)
+        self._timer.cancel()
+        self._transport.write(accepted.response)
+        connection = Connection(self._hall, self._transport, access)
+        self._transport.set_protocol(connection)
+        if rest:
+            connection.data_received(rest)
+
+    def _is_late(self) -> None:
+        self._turn_away(TurnedAwayError("408 Request Timeout", "cannot wait longer for the request"))
+
+    def _turn_away(self, error: TurnedAwayError) -> None:
+        self._timer.cancel()
+        self._timer = asyncio.get_running_loop().call_later(1.0, self._transport.abort)
+        self._transport.write(error.response)
+        self._transport.close()
+        self._head = b""

@@ -1,0 +1,271 @@
+"""Topics that clients subscribe: one connection to each publisher for all clients of a topic, read on the event loop."""
+
+import asyncio
+import logging
+import time
+from collections import deque
+from collections.abc import Awaitable
+from dataclasses import dataclass, field
+from typing import Any
+
+import rospy
+from rospy.impl.registration import get_topic_manager
+
+from rapp_bridge.arrival import Arrival, Wire
+from rapp_bridge.blocking import Blocking
+from rapp_bridge.client import Client
+from rapp_bridge.config import Config
+from rapp_bridge.decoding import Raw
+from rapp_bridge.errors import Invalid, Unreachable
+from rapp_bridge.links import Outgoing
+from rapp_bridge.master import Master
+from rapp_bridge.node import Marker
+from rapp_bridge.pace import Pace
+from rapp_bridge.protocol import Subscribe, Unsubscribe
+from rapp_bridge.rostypes import message_class
+from rapp_bridge.topics import registered, topic_type
+
+CONNECT_TIMEOUT = 10.0  # s
+RETRY = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # s between attempts at a publisher that cannot be reached
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(eq=False)
+class _Wish:
+    """One client's subscription of one topic."""
+
+    client: Client
+    wire: Wire
+    throttle: float  # s between messages
+    queue_length: int
+    due: float = float("-inf")
+    held: deque[Arrival] = field(default_factory=deque)  # for when they are due
+
+    def take(self, arrival: Arrival) -> None:
+        """Offer a message to the client, now, when it is due, or not at all."""
+        if self.throttle:
+            now = asyncio.get_running_loop().time()
+            if self.held or now < self.due:
+                self._hold(arrival)
+                return
+            self.due = now + self.throttle
+        self.client.offer(arrival, self.wire, self.queue_length)
+
+    def _hold(self, arrival: Arrival) -> None:
+        """Without a queue a message in the pause is dropped; with one the newest wait and come in their order."""
+        if not self.queue_length:
+            return
+        if not self.held:
+            asyncio.get_running_loop().call_at(self.due, self._release)
+        self.held.append(arrival)
+        if len(self.held) > self.queue_length:
+            self.held.popleft()
+
+    def _release(self) -> None:
+        if self.held:
+            loop = asyncio.get_running_loop()
+            self.client.offer(self.held.popleft(), self.wire, self.queue_length)
+            self.due = loop.time() + self.throttle
+            if self.held:
+                loop.call_at(self.due, self._release)
+
+
+@dataclass(eq=False)
+class _Source:
+    """A connection to one publisher; a latched topic's last message is kept for clients that come late."""
+
+    link: Outgoing
+    marker: Marker | None = None
+    latest: Arrival | None = None
+    cls: Any = None  # what its messages are; None: not known, or not the type that the clients want
+    latched: bool = False
+
+
+@dataclass(eq=False)
+class _Subscribed:
+    """A topic, who wants it, and who publishes it."""
+
+    name: str
+    cls: Any  # None: not known
+    subscriber: Any = None
+    wishes: dict[Client, _Wish] = field(default_factory=dict)
+    sources: dict[str, _Source] = field(default_factory=dict)
+    unused_since: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._pace = Pace(self._hold)
+
+    def _hold(self, on: bool) -> None:
+        for source in self.sources.values():
+            source.link.hold(on)
+
+    def deliver(self, source: _Source, raw: Raw) -> None:
+        if self.wishes or source.latched:
+            arrival = Arrival(raw, source.cls)
+            if source.latched:
+                source.latest = arrival
+            behind = False
+            for wish in self.wishes.values():
+                wish.take(arrival)
+                behind = wish.client.is_behind
+            if behind:
+                self._pace.check(self.wishes)
+
+    def tell(self, text: str) -> None:
+        for client in list(self.wishes):
+            client.tell("error", text)
+
+
+class Subscriptions:
+    """All topics that clients subscribe, by their global names. Belongs to the event loop's thread."""
+
+    def __init__(self, config: Config, master: Master, blocking: Blocking) -> None:
+        self._config = config
+        self._master = master
+        self._blocking = blocking
+        self._loop = asyncio.get_running_loop()
+        self._change = asyncio.Lock()
+        self._subscribed: dict[str, _Subscribed] = {}
+        self._connecting: set[asyncio.Task[None]] = set()
+
+    def subscribe(self, client: Client, wish: Subscribe) -> Awaitable[None] | None:
+        """Subscribe to the topic, or join it at once, and get what is latched; or change the client's wish.
+
+        Raises BridgeError.
+        """
+        name = rospy.resolve_name(wish.topic)
+        entry = self._subscribed.get(name)
+        if entry is None or entry.subscriber is None or (entry.cls is None and wish.compression != "cbor-raw"):
+            return self._subscribe(client, name, wish)
+        self._join(entry, client, wish)
+        return None
+
+    def unsubscribe(self, client: Client, wish: Unsubscribe) -> None:
+        """Take the client off the topic, if there; without clients the subscriber lives on for a while, see `sweep`."""
+        entry = self._subscribed.get(rospy.resolve_name(wish.topic))
+        if entry is not None and entry.wishes.pop(client, None) is not None:
+            entry.unused_since = time.monotonic()
+
+    async def sweep(self) -> None:
+        """Close the subscribers that no client has used for a while; to be called now and then."""
+        old = time.monotonic() - self._config.linger
+        async with self._change:
+            for name, entry in list(self._subscribed.items()):
+                if not entry.wishes and entry.unused_since < old:
+                    del self._subscribed[name]
+                    await self._blocking.run(entry.subscriber.unregister)
+
+    def connect(self, name: str, publisher: str, address: tuple[str, int]) -> bool:
+        """Connect to a publisher, soon; says whether the topic is ours. Called in rospy's threads."""
+        if self._loop.is_closed() or name not in self._subscribed:
+            return False
+        self._loop.call_soon_threadsafe(self._connect, name, publisher, address)
+        return True
+
+    def _join(self, entry: _Subscribed, client: Client, wish: Subscribe) -> None:
+        if entry.cls is not None and wish.type not in (None, entry.cls._type):
+            raise Invalid(f"cannot subscribe to {wish.topic} as {wish.type}: it is {entry.cls._type}; use that type")
+        wire = Wire(wish.topic, wish.compression, wish.fragment_size)
+        new = entry.wishes[client] = _Wish(client, wire, wish.throttle_rate / 1000, wish.queue_length)
+        if not wish.again:
+            for source in entry.sources.values():
+                if source.latest is not None:
+                    new.take(source.latest)
+
+    async def _subscribe(self, client: Client, name: str, wish: Subscribe) -> None:
+        async with self._change:
+            entry = self._subscribed.get(name)
+            if entry is None:
+                entry = await self._open(name, wish)
+            elif entry.cls is None:
+                await self._learn_type(entry, wish)
+            self._join(entry, client, wish)
+
+    async def _open(self, name: str, wish: Subscribe) -> _Subscribed:
+        cls = await self._find_class(name, wish)
+        entry = self._subscribed[name] = _Subscribed(name, cls, unused_since=time.monotonic())
+        try:
+            entry.subscriber = await self._blocking.run(registered, rospy.Subscriber, name, cls or rospy.AnyMsg)
+        except Unreachable:
+            del self._subscribed[name]
+            raise
+        return entry
+
+    async def _learn_type(self, entry: _Subscribed, wish: Subscribe) -> None:
+        if wish.compression != "cbor-raw":
+            entry.cls = await self._find_class(entry.name, wish)
+            for source in entry.sources.values():
+                self._check_type(entry, source)
+                if source.latest is not None:
+                    source.latest = Arrival(source.latest.raw, source.cls)
+
+    async def _find_class(self, name: str, wish: Subscribe) -> Any:
+        kind = await self._blocking.run(topic_type, self._master, name, wish.type)
+        if kind is not None and (wish.compression != "cbor-raw" or wish.type):
+            return message_class(kind)
+        if wish.compression == "cbor-raw":
+            return None
+        raise Invalid(f"cannot use topic {wish.topic} without a type: nobody publishes or subscribes it; give its type")
+
+    def _connect(self, name: str, publisher: str, address: tuple[str, int]) -> None:
+        entry = self._subscribed.get(name)
+        if entry is not None and publisher not in entry.sources:
+            task = self._loop.create_task(self._connect_to(entry, publisher, address))
+            self._connecting.add(task)
+            task.add_done_callback(self._connecting.discard)
+
+    async def _connect_to(self, entry: _Subscribed, publisher: str, address: tuple[str, int]) -> None:
+        for pause in RETRY:
+            if self._subscribed.get(entry.name) is not entry or publisher in entry.sources:
+                return
+            link = Outgoing(self._header(entry), self._config.message_limit)
+            source = entry.sources[publisher] = _Source(link)
+            link.on_message = lambda raw, source=source: entry.deliver(source, raw)  # type: ignore[misc]
+            link.on_lost = lambda source=source: self._lost(entry, publisher, source)  # type: ignore[misc]
+            link.on_opened = lambda source=source: self._check_type(entry, source)  # type: ignore[misc]
+            try:
+                await link.connect(address, CONNECT_TIMEOUT)
+            except Unreachable as error:
+                entry.sources.pop(publisher, None)
+                _log.warning("topic %s of %s: %s", entry.name, publisher, error)
+                if link.fields:  # it has answered, so asking again helps nobody
+                    entry.tell(f"cannot get the messages of {entry.name} from {publisher}: {error}")
+                    return
+                await asyncio.sleep(pause)
+                continue
+            self._mark(entry, publisher, source)
+            return
+
+    def _header(self, entry: _Subscribed) -> dict[str, str]:
+        cls = entry.cls or rospy.AnyMsg
+        return {
+            "topic": entry.name, "type": cls._type, "md5sum": cls._md5sum, "message_definition": cls._full_text,
+            "callerid": rospy.get_name(), "tcp_nodelay": "1",
+        }  # fmt: skip
+
+    @staticmethod
+    def _mark(entry: _Subscribed, publisher: str, source: _Source) -> None:
+        source.marker = Marker("i", entry.name, publisher, source.link.close)
+        rospys = get_topic_manager().get_subscriber_impl(entry.name)
+        if rospys is None or not rospys.add_connection(source.marker):
+            source.link.close()
+
+    @staticmethod
+    def _check_type(entry: _Subscribed, source: _Source) -> None:
+        fields = source.link.fields
+        source.latched = fields.get("latching") == "1"
+        if entry.cls is None or fields.get("md5sum") == entry.cls._md5sum:
+            source.cls = entry.cls
+        elif fields:
+            kind = entry.cls._type
+            entry.tell(
+                f"cannot read {entry.name} of {fields.get('callerid')}: it is {fields.get('type')}, not the {kind} known here"
+            )
+
+    @staticmethod
+    def _lost(entry: _Subscribed, publisher: str, source: _Source) -> None:
+        if entry.sources.get(publisher) is source:
+            del entry.sources[publisher]
+        if source.marker is not None:
+            source.marker.close()
