@@ -183,9 +183,14 @@ def test_a_run_is_drawn_with_all_who_took_part(demos: dict[str, Demo]) -> None:
     assert f"person-)a_core: “{SUNDAY}”" in mermaid
 
 
+def _heed_interrupts() -> None:
+    """A shell starts its background jobs with SIGINT ignored, and that is inherited."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_an_interrupted_demo_leaves_no_process(tmp_path: Path) -> None:
     words = [str(ROOT / "rapp"), "demo", "--folder", str(tmp_path)]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, preexec_fn=_heed_interrupts)
     assert process.stdout is not None
     try:
         for line in process.stdout:

@@ -118,7 +118,7 @@ def test_a_wrong_room_file_ends_the_start_with_its_reason(tmp_path: Path) -> Non
     assert children(os.getpid()) == before
 
 
-def test_the_command_writes_a_picture_and_keeps_standard_output_clean(tmp_path: Path) -> None:
+def test_the_command_writes_a_picture_and_says_nothing_else_than_where(tmp_path: Path) -> None:
     words = [
         sys.executable,
         "-m",
@@ -131,7 +131,7 @@ def test_the_command_writes_a_picture_and_keeps_standard_output_clean(tmp_path: 
         "1",
     ]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
-    assert (done.returncode, done.stdout) == (0, "")
+    assert (done.returncode, done.stdout) == (0, f"the room is photographed in {tmp_path / 'room.png'}\n")
     image = cv2.imread(str(tmp_path / "room.png"))
     assert image is not None and image.shape == (720, 960, 3)
     text, _, _ = cv2.QRCodeDetector().detectAndDecode(image[200:360, 640:780])  # hung unmirrored, and sharp enough to be read
