@@ -136,9 +136,9 @@ class ShowAround(DynamicAgent):
 
     def _end(self, _share: Subsystem) -> None:
         begin = "I am back" if self._back else "I am not back, please help me"
-        names = " and the ".join(place.name for place in self._seen)
+        names = ", the ".join(place.name for place in self._seen)
         pictures = f"pictures of the {names}, and" if names else "no picture, only"
-        say(f"{begin}, I have kept {pictures} the path I walked")
+        say(f"{begin}, I have kept {pictures} my path")
 
     def terminate(self) -> None:
         """Rest, however it went."""

@@ -42,7 +42,7 @@ def draw(room: Room, path: Sequence[Pose], seen: Sequence[Place], stops: Sequenc
     for thing in room.things:
         (x, y), (width, depth) = thing.middle, thing.size
         cv2.rectangle(sheet.image, sheet.at((x - width / 2, y - depth / 2)), sheet.at((x + width / 2, y + depth / 2)), THING, -1)
-        cv2.putText(sheet.image, thing.name, sheet.at((x - width / 2, y)), FONT, 0.5, WALL, 1, cv2.LINE_AA)
+        sheet.write(thing.name, (x - width / 2 - 0.05, y - depth / 2 - 0.15), WALL)
     cv2.polylines(sheet.image, [sheet.all([(pose.x, pose.y) for pose in path])], False, PATH, 2, cv2.LINE_AA)
     for pose in path:
         cv2.circle(sheet.image, sheet.at((pose.x, pose.y)), 3, PATH, -1, cv2.LINE_AA)
@@ -51,7 +51,7 @@ def draw(room: Room, path: Sequence[Pose], seen: Sequence[Place], stops: Sequenc
         sheet.write(f"{number} {place.name}", place.stand, PLACE)
     for pose in stops:
         cv2.drawMarker(sheet.image, sheet.at((pose.x, pose.y)), STOP, cv2.MARKER_TILTED_CROSS, 18, 3, cv2.LINE_AA)
-        sheet.write("stopped", (pose.x, pose.y), STOP)
+        sheet.write("stopped", (pose.x, pose.y - 0.15), STOP)
     for pose, text in ((path[0], "start"), (path[-1], "end")):
         cv2.circle(sheet.image, sheet.at((pose.x, pose.y)), 5, START, -1, cv2.LINE_AA)
         sheet.write(text, (pose.x, pose.y - (0.25 if text == "start" else 0.35)), START)

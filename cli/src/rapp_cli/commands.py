@@ -21,7 +21,7 @@ class Command:
 
 
 COMMANDS = (
-    Command("demo", "run voice-mail end to end: a person speaks, a mail arrives", demo.add_options, demo.run),
+    Command("demo", "run a story end to end: voice-mail or show-around", demo.add_options, demo.run),
     Command("up", "start a robot and a cloud that keep running", up.add_options, up.run),
     Command("say", "speak to the simulated robot, and see what it does", say.add_options, say.run),
     Command("listen", "speak to it by this computer's microphone", listen.add_options, listen.run),

@@ -4,6 +4,7 @@ import asyncio
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("QI_LOG_LEVEL", "1")  # libqi reads it when loaded, and logs on stdout
 
@@ -57,6 +58,12 @@ class Person:
         assert self._world is not None
         world = self._world
         await asyncio.to_thread(lambda: world.personPlay(str(recording), _async=True).value(CALL_TIMEOUT))
+
+    async def ask_room(self, method: str, *values: Any) -> Any:
+        """Call a method of SimWorld, such as getRobotPose; gives its result."""
+        assert self._world is not None
+        world = self._world
+        return await asyncio.to_thread(lambda: getattr(world, method)(*values, _async=True).value(CALL_TIMEOUT))
 
     async def leave(self) -> None:
         """Go: the robot is heard no longer."""

@@ -12,6 +12,7 @@ from typing import Any, TextIO
 from tornado.websocket import websocket_connect
 
 KINDS = ("entered", "left", "failed", "said", "heard", "message")
+READING = "rapp_get_robot_pose"  # asked for again and again while the robot walks
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,11 @@ class Timeline:
         self._changed = asyncio.Condition()
 
     async def add(self, entry: Entry) -> None:
-        """Keep one entry, print it unless it is a mere leaving or within a core service, wake those who wait."""
+        """Keep one entry, print it unless it is a mere leaving or reading, or within a core service, wake those who wait."""
         self.entries.append(entry)
         if self._record is not None:
             append(self._record, entry)
-        if entry.kind != "left" and "/" not in entry.state:
+        if entry.kind != "left" and "/" not in entry.state and not entry.detail.endswith(READING):
             self._print(entry)
         async with self._changed:
             self._changed.notify_all()

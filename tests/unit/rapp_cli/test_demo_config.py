@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rapp_cli.demo.config import KEYWORD, SENTENCE, DemoConfig, add_options, read
+from rapp_cli.demo.config import KEYWORDS, SENTENCES, SHOW_AROUND, VOICE_MAIL, DemoConfig, add_options, read
 from rapp_cli.errors import UsageError
 
 
@@ -16,8 +16,8 @@ def config(*words: str, env: dict[str, str] | None = None) -> DemoConfig:
 
 
 def test_the_keyword_is_said_by_default_and_a_sentence_with_long() -> None:
-    assert config().command == KEYWORD
-    assert config("--long").command == SENTENCE
+    assert config().command == KEYWORDS[VOICE_MAIL]
+    assert config("--long").command == SENTENCES[VOICE_MAIL]
     assert config("--long", "--say", "please write to my son").command == "please write to my son"
 
 
@@ -47,3 +47,23 @@ def test_a_real_account_comes_from_options_before_environment() -> None:
 def test_nothing_to_say_is_refused() -> None:
     with pytest.raises(UsageError, match="--message"):
         config("--message", "  ")
+
+
+def test_a_story_has_its_own_words() -> None:
+    assert config().story == VOICE_MAIL
+    assert config(SHOW_AROUND).command == KEYWORDS[SHOW_AROUND]
+    assert config(SHOW_AROUND, "--long").command == SENTENCES[SHOW_AROUND]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--obstacle",),
+        (VOICE_MAIL, "--silent"),
+        (SHOW_AROUND, "--obstacle", "--robot", "tcp://nao.local:9559"),
+        (SHOW_AROUND, "--silent", "--long"),
+    ],
+)
+def test_options_of_the_tour_that_cannot_be_met_are_refused(words: tuple[str, ...]) -> None:
+    with pytest.raises(UsageError, match="--silent"):
+        config(*words)

@@ -39,7 +39,7 @@ def test_it_walks_to_three_places_takes_a_picture_of_each_comes_back_and_rests()
         "I show you around",
         *[text for name in PLACES for text in (f"I go to the {name}", f"this is the {name}")],
         "I go back",
-        "I am back, I have kept pictures of the lamp and the table and the door, and the path I walked",
+        "I am back, I have kept pictures of the lamp, the table, the door, and my path",
     ]
     assert core.posture == "Crouch"
     assert list(core.kept) == ["lamp.jpg", "table.jpg", "door.jpg", "path.png"]
@@ -62,10 +62,10 @@ def test_the_path_is_drawn_over_the_room() -> None:
     assert (height, width) == (800, 800)  # 4 m x 4 m, at 180 pixels a metre, and a border
     blue = (sheet == (190, 90, 20)).all(axis=2)
     rows, columns = np.nonzero(blue)
-    assert columns.min() == pytest.approx(40 + 180 * (1.5 - 0.30), abs=6)  # the lamp's place
-    assert columns.max() == pytest.approx(40 + 180 * (1.5 + 0.30), abs=6)  # home
-    assert rows.min() == pytest.approx(40 + 180 * (1.8 - 0.62), abs=6)  # the table's
-    assert rows.max() == pytest.approx(40 + 180 * (1.8 + 0.35), abs=6)
+    assert columns.min() == pytest.approx(40 + 180 * (1.5 - 0.22), abs=6)  # the table's place
+    assert columns.max() == pytest.approx(40 + 180 * (1.5 + 0.35), abs=6)  # the door's
+    assert rows.min() == pytest.approx(40 + 180 * (1.8 - 0.88), abs=6)
+    assert rows.max() == pytest.approx(40 + 180 * (1.8 + 0.30), abs=6)  # the lamp's
 
 
 def test_a_robot_that_knows_where_it_is_is_not_told() -> None:
@@ -84,19 +84,29 @@ def test_an_obstacle_is_gone_round_on_the_roomier_side() -> None:
     assert round_[-1].x == stopped[-1].x
     # Away from the lamp, which stands on the other side.
     assert all(pose.x > 0.15 for pose in round_[:2])
-    assert core.said()[-1].startswith("I am back, I have kept pictures of the lamp and the table and the door")
+    assert core.said()[-1].startswith("I am back, I have kept pictures of the lamp, the table, the door")
 
 
 def test_an_obstacle_on_both_sides_is_given_up_and_the_picture_is_taken_from_there() -> None:
-    core = tour(walks=[OBSTACLE, OBSTACLE, OBSTACLE])
+    core = tour(walks=[None, OBSTACLE, OBSTACLE, OBSTACLE])
     said = core.said()
-    assert said[1:4] == ["I go to the lamp", *["something is in my way, I go round it"] * 2]
-    assert said[4:6] == ["something is in my way, I cannot get to the lamp", "this is the lamp"]
-    first, second = walks(core)[1:3]
-    line = math.atan2(-0.35 - HOME.y, -0.30 - HOME.x)
-    sides = [math.sin(math.atan2(way[0].y - HOME.y, way[0].x - HOME.x) - line) for way in (first, second)]
-    assert sides == pytest.approx([1, -1]) or sides == pytest.approx([-1, 1])
-    assert "lamp.jpg" in core.kept
+    assert said[3:6] == ["I go to the table", *["something is in my way, I go round it"] * 2]
+    assert said[6:8] == ["something is in my way, I cannot get to the table", "this is the table"]
+    lamp, table = (core.parameters["places"][number]["stand"] for number in (0, 1))
+    line = math.atan2(table[1] - lamp[1], table[0] - lamp[0])
+    sides = [math.sin(math.atan2(way[0].y - lamp[1], way[0].x - lamp[0]) - line) for way in walks(core)[2:4]]
+    assert sides == pytest.approx([-1, 1])
+    assert "table.jpg" in core.kept
+
+
+def test_an_obstacle_where_it_would_stand_is_not_gone_round() -> None:
+    core = tour(walks=[OBSTACLE])
+    assert core.said()[1:4] == ["I go to the lamp", "something is in my way, I cannot get to the lamp", "this is the lamp"]
+
+
+def test_it_turns_to_what_its_neck_does_not_reach() -> None:
+    core = tour(walks=[None, None, OBSTACLE, OBSTACLE, OBSTACLE, None])
+    assert all(abs(math.atan2(y, x)) < 1.6 for name, (x, y, _) in [call for call in core.calls if call[0] == "look_at_point"])
 
 
 def test_a_robot_that_cannot_get_back_says_so_and_rests() -> None:
@@ -115,4 +125,4 @@ def test_without_a_picture_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     core = tour()
     assert sum(text.startswith("I cannot take a picture") for text in core.said()) == 3
     assert list(core.kept) == ["path.png"]
-    assert core.said()[-1] == "I am back, I have kept no picture, only the path I walked"
+    assert core.said()[-1] == "I am back, I have kept no picture, only my path"

@@ -1,1 +1,1 @@
-"""`./rapp demo`: the paper's voice-mail on real processes; robot, person and mail account may be real or not."""
+"""`./rapp demo`: stories on real processes; robot, person and mail account may be real or not."""

@@ -13,14 +13,16 @@ from rapp_cli import mail_account
 from rapp_cli.errors import UsageError
 from rapp_cli.mail_account import MailAccount
 
-KEYWORD = "e-mail"
-SENTENCE = "I would like to send a message to my daughter"
+VOICE_MAIL, SHOW_AROUND = "voice-mail", "show-around"
+KEYWORDS = {VOICE_MAIL: "e-mail", SHOW_AROUND: "show me around"}
+SENTENCES = {VOICE_MAIL: "I would like to send a message to my daughter", SHOW_AROUND: "please take me on a tour of your room"}
 
 
 @dataclass(frozen=True)
 class DemoConfig:
     """One run of the demo."""
 
+    story: str  # VOICE_MAIL or SHOW_AROUND
     folder: Path  # everything the run writes
     command: str  # what the person says first
     recipient: str  # the name the person says
@@ -31,12 +33,15 @@ class DemoConfig:
     mail: MailAccount | None  # None for the demo's own mail server
     address: str  # the recipient's mail address
     timeout: float  # s, for the whole story
+    obstacle: bool  # something stands in the way of the tour
+    silent: bool  # the simulated robot is fed with text, and speaks without sound
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `./rapp demo`; those for real equipment can be given by environment (RAPP_ROBOT, RAPP_CLOUD, ...)."""
-    parser.add_argument("--long", action="store_true", help=f"say a whole sentence, such as “{SENTENCE}”")
-    parser.add_argument("--say", metavar="TEXT", help=f"what the person says first (default “{KEYWORD}”)")
+    parser.add_argument("story", nargs="?", choices=list(KEYWORDS), default=VOICE_MAIL, help="what happens (%(default)s)")
+    parser.add_argument("--long", action="store_true", help=f"say a whole sentence, such as “{SENTENCES[VOICE_MAIL]}”")
+    parser.add_argument("--say", metavar="TEXT", help=f"what the person says first (default “{KEYWORDS[VOICE_MAIL]}”)")
     parser.add_argument("--recipient", default="Elizabeth", metavar="NAME", help="name of the recipient (%(default)s)")
     parser.add_argument(
         "--message",
@@ -45,6 +50,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="the spoken message (“%(default)s”)",
     )
     parser.add_argument("--voice", default="en-us+m3", help="espeak-ng voice of the person (%(default)s)")
+    parser.add_argument("--obstacle", action="store_true", help="show-around: put a carton in the robot's way")
+    parser.add_argument("--silent", action="store_true", help="show-around: words go as text in place of sound")
     parser.add_argument("--folder", type=Path, help="where the run writes (default: a new folder among your data)")
     parser.add_argument("--timeout", type=float, default=180.0, help="seconds for the whole story (%(default)s)")
     real = parser.add_argument_group("real equipment")
@@ -59,11 +66,13 @@ def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> De
     account = mail_account.read(options, env)
     if account and not options.address:
         raise UsageError("cannot use a real mail account without a real recipient: give --address NAME@DOMAIN")
+    _check_tour(options, env)
     if not options.recipient.strip() or not options.message.strip():
         raise UsageError("cannot send a voice-mail without --recipient and --message")
     return DemoConfig(
+        story=options.story,
         folder=(options.folder or _new_folder()).resolve(),
-        command=options.say or (SENTENCE if options.long else KEYWORD),
+        command=options.say or (SENTENCES if options.long else KEYWORDS)[options.story],
         recipient=options.recipient,
         message=options.message,
         voice=options.voice,
@@ -72,7 +81,19 @@ def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> De
         mail=account,
         address=options.address or f"{_mailbox(options.recipient)}@home.example",
         timeout=options.timeout,
+        obstacle=options.obstacle,
+        silent=options.silent,
     )
+
+
+def _check_tour(options: argparse.Namespace, env: Mapping[str, str]) -> None:
+    tour = options.story == SHOW_AROUND
+    if (options.obstacle or options.silent) and not tour:
+        raise UsageError(f"cannot use --obstacle or --silent with {options.story}: they are for {SHOW_AROUND}")
+    if (options.obstacle or options.silent) and (options.robot or env.get("RAPP_ROBOT")):
+        raise UsageError("cannot use --obstacle or --silent with a real robot: put something in its way yourself")
+    if options.silent and options.long:
+        raise UsageError("cannot interpret a sentence without its sound: leave out --silent or --long")
 
 
 def _mailbox(name: str) -> str:

@@ -1,7 +1,7 @@
-"""The story of the demo as the person lives it: ask, give the name, speak the message, repeat when not understood."""
+"""What the stories of the demo have in common: a person asks for a RApp, and it is judged by what it has left."""
 
 import asyncio
-from dataclasses import dataclass
+from typing import Protocol
 
 from rapp_cli.errors import CommandError
 from rapp_cli.person import Person
@@ -12,44 +12,24 @@ PATIENCE = 15.0  # s without an answer after which the person asks again
 ASKS = 4  # how often the person asks before giving up
 
 
-@dataclass(frozen=True)
-class Lines:
-    """What the person says, in this order."""
+class Story(Protocol):
+    """One story."""
 
-    command: str
-    recipient: str
-    message: str
+    async def live(self, person: Person, timeline: Timeline) -> None:
+        """Be the person, until the robot listens again. Raises CommandError."""
+
+    async def judge(self, timeline: Timeline) -> int:
+        """Tell what was left, on the terminal; gives the exit status. With a real robot, `live` has not been called."""
 
 
-async def live(person: Person, lines: Lines, timeline: Timeline) -> None:
-    """Ask for the RApp and answer it until the robot listens again; raises CommandError when it never understands."""
+async def ask(person: Person, command: str, timeline: Timeline) -> int:
+    """Ask for a RApp; gives the index behind its start in the timeline. Raises CommandError when it is never understood."""
     listening = await timeline.wait_for("core", "entered", "s3")
     for _ in range(ASKS):
         await asyncio.sleep(THINKING)
-        await person.say(lines.command)
+        await person.say(command)
         try:
-            started = await asyncio.wait_for(timeline.wait_for("core", "entered", "s9", listening), PATIENCE)
-            break
+            return await asyncio.wait_for(timeline.wait_for("core", "entered", "s9", listening), PATIENCE)
         except TimeoutError:
             continue
-    else:
-        raise CommandError(f"cannot get the robot to start a RApp for “{lines.command}”; see the timeline above")
-    answering = asyncio.create_task(_answer(person, lines))
-    try:
-        await timeline.wait_for("core", "entered", "s3", started)
-    finally:
-        answering.cancel()
-
-
-async def _answer(person: Person, lines: Lines) -> None:
-    """Say the recipient's name or the message, whichever the robot has just asked for."""
-    while True:
-        heard = (await person.next_heard()).lower()
-        if "recording message" in heard:
-            reply = lines.message
-        elif "recognition" in heard or "again" in heard:
-            reply = lines.recipient
-        else:
-            continue
-        await asyncio.sleep(THINKING)
-        await person.say(reply)
+    raise CommandError(f"cannot get the robot to start a RApp for “{command}”; see the timeline above")

@@ -39,6 +39,8 @@ async def running_system(config: DemoConfig) -> AsyncIterator[System]:
         words = [str(ROBOT_SCRIPTS / "robot"), "--home", str(config.folder / "robot"), "--name", ROBOT_NAME]
         if config.robot:
             words += ["--robot", config.robot]
+        if config.silent:
+            words += ["--microphone", "text", "--voice", "silent"]
         env = {**os.environ, **link_environment(cloud, account)}
         ready = await children.start(Child("robot", words, env, logs / "robot.log"))
         yield System(children, ready["bridge"], ready["robot"], ready["master"], maildir, logs)
