@@ -11,12 +11,13 @@ from typing import Any
 import cv2
 from drawing import draw
 from room import Place, Point, Room, along, seen_from
-from track import Track
+from track import Track, beside
 
 from rapp_api import Behaviour, DynamicAgent, Edge, Machine, Pose, Refused, Subsystem, communication, keepsakes, navigation, vision
 
 _log = logging.getLogger(__name__)
 SIDEWAYS = 1.5  # rad to which the head alone turns
+TRIES = 3  # of a picture: a camera that has slept may be late
 SWITCHED_ON = 0.02  # m or rad from the map's origin: nobody has told where it is, and the robot has not walked
 
 
@@ -34,6 +35,7 @@ class ShowAround(DynamicAgent):
         self._track = Track()
         self._ahead: list[Place | None] = [*self._room.places, None]  # where to go yet; None is back
         self._way: list[Point] = []  # to the next of them
+        self._saying = ""  # on the way
         self._ways: list[list[Point]] | None = None  # round what is in the way; None: nothing was yet
         self._seen: list[Place] = []  # those with a picture
         self._stops: list[Pose] = []  # where something was in the way
@@ -50,9 +52,9 @@ class ShowAround(DynamicAgent):
         """Place after place, then back."""
         states = {
             "s31": Behaviour("s31", lambda _share: say("I show you around"), label="say: I show you around"),
-            "s32": Behaviour("s32", self._tell, label="say where to"),
-            "s33": Behaviour("s33", self._walk, label="walk there"),
-            "s34": Behaviour("s34", self._go_round, label="say that something is in the way, and go round"),
+            "s32": Behaviour("s32", self._choose, label="choose where to go"),
+            "s33": Behaviour("s33", self._walk, label="say it, and walk there"),
+            "s34": Behaviour("s34", self._go_round, label="find a way round"),
             "s35": Behaviour("s35", self._give_up, label="say that it is given up"),
             "s36": Behaviour("s36", self._look, label="look, and take a picture"),
             "s37": Behaviour("s37", self._keep_path, label="draw the path"),
@@ -73,9 +75,9 @@ class ShowAround(DynamicAgent):
         ]
         return Machine("show_around", states, "s31", edges, ["end"], label="execute")
 
-    def _tell(self, _share: Subsystem) -> None:
+    def _choose(self, _share: Subsystem) -> None:
         place = self._ahead[0]
-        say("I go back" if place is None else f"I go to the {place.name}")
+        self._saying = "I go back" if place is None else f"I go to the {place.name}"
         self._way, self._ways = [self._goal], None
 
     @property
@@ -90,7 +92,7 @@ class ShowAround(DynamicAgent):
             path[-1] = self._start
         share.memory["stopped"] = False
         try:
-            with self._track.followed():
+            with beside(lambda: say(self._saying)), self._track.followed():
                 navigation.move_along_path(path)
         except Refused as error:
             _log.info("%s", error)
@@ -106,7 +108,7 @@ class ShowAround(DynamicAgent):
     def _go_round(self, _share: Subsystem) -> None:
         assert self._ways
         self._way = self._ways.pop(0)
-        say("something is in my way, I go round it")
+        self._saying = "something is in my way, I go round it"
 
     def _give_up(self, _share: Subsystem) -> None:
         place = self._ahead[0]
@@ -122,8 +124,11 @@ class ShowAround(DynamicAgent):
             navigation.move_to(0.0, 0.0, side)
             x, y, z = seen_from(self._track.note(), place.look)
         navigation.look_at_point(x, y, z)
-        picture = vision.capture_image("top", vision.VGA)
-        if not picture.size:
+        for _ in range(TRIES):
+            picture = vision.capture_image("top", vision.VGA)
+            if picture.size:
+                break
+        else:
             say(f"I cannot take a picture of the {place.name}")
             return
         keepsakes.keep(place.name.replace(" ", "-") + ".jpg", cv2.imencode(".jpg", picture)[1].tobytes())
@@ -136,9 +141,8 @@ class ShowAround(DynamicAgent):
 
     def _end(self, _share: Subsystem) -> None:
         begin = "I am back" if self._back else "I am not back, please help me"
-        names = ", the ".join(place.name for place in self._seen)
-        pictures = f"pictures of the {names}, and" if names else "no picture, only"
-        say(f"{begin}, I have kept {pictures} my path")
+        number = len(self._seen)
+        say(f"{begin}, I have kept {number} picture{'s' if number != 1 else ''} and my path")
 
     def terminate(self) -> None:
         """Rest, however it went."""

@@ -1,11 +1,13 @@
-"""The path the robot has walked, as it measured it: asked for while it walks."""
+"""The path the robot has walked, as it measured it: asked for while it walks; and what else is done meanwhile."""
 
+import logging
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rapp_api import Pose, RappError, navigation
 
+_log = logging.getLogger(__name__)
 EVERY = 0.5  # s between two poses
 
 
@@ -25,17 +27,31 @@ class Track:
     def followed(self) -> Iterator[None]:
         """While the robot walks."""
         over = threading.Event()
-        follower = threading.Thread(target=self._follow, args=(over,), daemon=True)
-        follower.start()
-        try:
-            yield
-        finally:
-            over.set()
-            follower.join()
 
-    def _follow(self, over: threading.Event) -> None:
-        while not over.wait(EVERY):
-            try:
+        def follow() -> None:
+            while not over.wait(EVERY):
                 self.note()
-            except RappError:
-                return  # who walks hears of it, too
+
+        with beside(follow):
+            try:
+                yield
+            finally:
+                over.set()
+
+
+@contextmanager
+def beside(work: Callable[[], object]) -> Iterator[None]:
+    """Have something done meanwhile, and wait for it at the end; what goes wrong with it is logged."""
+
+    def do() -> None:
+        try:
+            work()
+        except RappError as error:
+            _log.warning("%s", error)
+
+    thread = threading.Thread(target=do, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join()
