@@ -1,6 +1,7 @@
 """A whole system for system tests: real robot, platform and mail server, each process of which can be killed, frozen, brought back.
 
-The robot is simulated with a text-fed microphone and a silent voice, so that a story takes no longer than its waits.
+The robot is simulated with a text-fed microphone and a silent voice, so that a story takes no longer than its waits; it has a body
+in a room when it is wanted.
 """
 
 import json
@@ -61,11 +62,14 @@ def free_port() -> int:
 class WholeRobot:
     """Start it with `start`, end it with `close`; `seen` is all that was published so far."""
 
-    def __init__(self, folder: Path, publish: Iterable[Path] = (), profile: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self, folder: Path, publish: Iterable[Path] = (), profile: Mapping[str, Any] | None = None, body: bool = False
+    ) -> None:
         self.folder, self.home, self.data = folder, folder / "robot", folder / "cloud"
         self.maildir = folder / "mail"
         self.logs = folder / "logs"
         self.settings = ""  # of the core agent, in TOML, beside its defaults
+        self.body = () if body else ("--no-world",)  # options of the simulator
         self.cloud_port = free_port()
         self.cloud_url = f"http://127.0.0.1:{self.cloud_port}"  # as the link reaches the platform
         self.mail_port = free_port()
@@ -106,7 +110,7 @@ class WholeRobot:
             "roscore": ["rosmaster", "--core", "-p", str(self._ports["roscore"])],
             "mail": [*run, "rapp_cloud.mail", "--port", str(self.mail_port), "--maildir", str(self.maildir)],
             "cloud": [*run, "rapp_cloud", "--port", str(self.cloud_port), "--data", data, *self._offered()],
-            "nao_sim": [*run, "rapp_nao_sim", "--port", str(self._ports["nao_sim"]), "--files", home, *TEXT_FED],
+            "nao_sim": [*run, "rapp_nao_sim", "--port", str(self._ports["nao_sim"]), "--files", home, *TEXT_FED, *self.body],
             "rosbridge": [*run, "rapp_bridge", "--port", str(self._ports["rosbridge"])],
             "link": [*run, "rapp_link", "--bridge", f"ws://127.0.0.1:{self._ports['rosbridge']}", "--cloud", self.cloud_url],
         }[name]
@@ -119,13 +123,20 @@ class WholeRobot:
         path.write_text(self.settings)
         return path
 
+    @property
+    def ros(self) -> dict[str, str]:
+        """Environment of a process that joins its ROS."""
+        return {
+            "ROS_MASTER_URI": f"http://127.0.0.1:{self._ports['roscore']}",
+            "ROS_IP": "127.0.0.1",
+            "ROS_LOG_DIR": str(self.logs / "ros"),
+        }
+
     def _environment(self) -> dict[str, str]:
         self.home.mkdir(parents=True, exist_ok=True)
         return {
             **os.environ,
-            "ROS_MASTER_URI": f"http://127.0.0.1:{self._ports['roscore']}",
-            "ROS_IP": "127.0.0.1",
-            "ROS_LOG_DIR": str(self.logs / "ros"),
+            **self.ros,
             "RAPP_HOME": str(self.home),
             "RAPP_TOKEN_FILE": str(self.data / "robots" / "nao.token"),
             "RAPP_ROOT_FILE": str(self.data / "root.json"),
@@ -188,11 +199,16 @@ class WholeRobot:
     def robot_url(self) -> str:
         return f"tcp://127.0.0.1:{self._ports['nao_sim']}"
 
-    def room(self, method: str, *words: Any) -> None:
-        """Call a method of SimWorld."""
+    @property
+    def naoqi(self) -> Connection:
+        """NAOqi itself, past the core agent."""
         if self._connection is None:
             self._connection = Connection(self.robot_url, 20.0)
-        self._connection.call("SimWorld", method, *words)
+        return self._connection
+
+    def room(self, method: str, *words: Any) -> Any:
+        """Call a method of SimWorld; gives its result."""
+        return self.naoqi.call("SimWorld", method, *words)
 
     def say(self, text: str) -> None:
         """The person says a text once."""
@@ -270,7 +286,7 @@ class WholeRobot:
                 ready.put(None)
 
 
-TEXT_FED = ("--microphone", "text", "--voice", "silent", "--no-world")
+TEXT_FED = ("--microphone", "text", "--voice", "silent")
 
 
 def entered(state: str, agent: str = "core") -> Callable[[Seen], bool]:

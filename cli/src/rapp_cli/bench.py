@@ -1,6 +1,7 @@
 """`./rapp bench SUBJECT`: runs one program of tests/benchmarks, which prints its table."""
 
 import argparse
+import os
 import subprocess
 import sys
 
@@ -11,6 +12,7 @@ SUBJECTS = {
     "speech": "speech.py",
     "interpret": "interpret.py",
     "bridge": "bridge.py",
+    "robot": "robot.py",
 }
 """Subject to program."""
 
@@ -24,4 +26,5 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the benchmark in the foreground; its exit status."""
     words = [sys.executable, str(BENCHMARKS / SUBJECTS[options.subject]), *options.options]
-    return subprocess.run(words, cwd=ROOT, check=False).returncode
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(BENCHMARKS.parent), os.environ.get("PYTHONPATH", "")])}
+    return subprocess.run(words, cwd=ROOT, env=env, check=False).returncode

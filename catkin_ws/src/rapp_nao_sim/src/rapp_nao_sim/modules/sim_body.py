@@ -31,6 +31,16 @@ class SimBody(Module):
         return self.__there().fallen()
 
     @working
+    def getLink(self, name: str) -> list[float]:  # noqa: N802
+        """Where a link truly is in the room, "torso" or one of the model's: its frame as 4x4 matrix, row by row; m."""
+        return self.__there().link(name)
+
+    @working
+    def getTime(self) -> float:  # noqa: N802
+        """Seconds that were simulated so far: as many as have passed, unless the computer was too slow."""
+        return self.__there().clock()
+
+    @working
     def takeTouched(self) -> list[str]:  # noqa: N802
         """What of the room, but for the floor, the robot has touched since this was asked the last time: things, wall, door."""
         return self.__there().take_touched()

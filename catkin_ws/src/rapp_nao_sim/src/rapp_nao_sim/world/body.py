@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rapp_nao_sim.world.errors import Refused
 from rapp_nao_sim.world.model import BODY, JOINTS, LINKS, SHAPES, SOLE
 from rapp_nao_sim.world.urdf import urdf, write_meshes
 
@@ -100,6 +101,18 @@ class Body:
         position, orientation = self.base()
         rotation = np.array(self._bullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)
         return np.array(position) - rotation @ np.array(LINKS["torso"].centre), rotation
+
+    def matrix(self, link: str) -> list[float]:
+        """A link's frame, or the torso's, as 4x4 matrix row by row; raises Refused naming the known ones."""
+        matrix = np.eye(4)
+        if link == "torso":
+            matrix[:3, 3], matrix[:3, :3] = self.torso()
+        elif link in self._links:
+            matrix[:3, 3], orientation = self.frame(link)
+            matrix[:3, :3] = np.array(self._bullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)
+        else:
+            raise Refused(f"cannot find link {link!r}: known are torso, {', '.join(self._links)}")
+        return [float(value) for value in matrix.flat]
 
     def contacts(self, link: str) -> Any:
         """pybullet's contact points between a link and the room."""

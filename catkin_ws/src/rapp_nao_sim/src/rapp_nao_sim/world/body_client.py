@@ -23,6 +23,15 @@ class BodyClient:
         """x and y of the middle of the soles, and the heading."""
         return self._tuple("robot_pose")
 
+    def link(self, name: str) -> list[float]:
+        """Where a link truly is: its frame, or the torso's, as 4x4 matrix row by row."""
+        matrix: list[float] = self._physics.call("link", name)
+        return matrix
+
+    def clock(self) -> float:
+        """Seconds that were simulated so far."""
+        return float(self._physics.call("clock"))
+
     def velocity(self) -> tuple[float, float, float]:
         """Ahead, to the left and turning; of the step under way, or of the torso when it does not walk."""
         return self._tuple("velocity")

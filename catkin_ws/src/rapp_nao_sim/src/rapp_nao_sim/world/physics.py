@@ -39,11 +39,12 @@ class Physics:
         self._service = service
         self._bullet = connect()
         self._still = 0  # ticks since anything happened
+        self._clock = 0.0  # s simulated
         self._pushes: list[tuple[tuple[float, float, float], float]] = []
         service.offer({"set_up": self._set_up})
 
     def _set_up(self, file: Path | None, posture: str | None, pace: float) -> room.Room:
-        self._period = TICK / pace
+        self._period = TICK / pace if pace else 0.0
         plan = room.load(file or room.FILE)
         known = postures.load()
         start = plan.robot
@@ -74,6 +75,8 @@ class Physics:
 
         return {
             "robot_pose": body.pose,
+            "link": body.matrix,
+            "clock": lambda: self._clock,
             "velocity": motion.velocity,
             "joint_angles": lambda names: _pick(body.angles(), names),
             "commanded_angles": lambda names: _pick(motion.targets, names),
@@ -120,7 +123,7 @@ class Physics:
         due = time.monotonic()
         while True:
             self._tick()
-            due += self._period
+            due = due + self._period if self._period else time.monotonic()
             late = time.monotonic() - due
             if late > LATEST:
                 _log.warning("the physics is %.2f s late: that time is given up", late)
@@ -131,6 +134,7 @@ class Physics:
                     break
 
     def _tick(self) -> None:
+        self._clock += TICK
         self._step()
         self._senses.tick(TICK)
 

@@ -23,7 +23,7 @@ class WorldConfig:
 
     room: Path | None = None  # room file; None: our own
     posture: str | None = None  # at the start; None: the room file's
-    pace: float = 1.0  # simulated seconds per second; the physics can do about 10
+    pace: float = 1.0  # simulated seconds per second; 0: as many as the computer can do
     start_timeout: float = 30.0  # s, until the robot stands in its room
     width: int = 960  # pixels of photographs
     height: int = 720
