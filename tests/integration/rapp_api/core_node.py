@@ -45,11 +45,16 @@ def say(request: Any, response: Any) -> None:
         time.sleep(float(request.text[5:]))
 
 
+quick_ones = threading.Semaphore(0)
+
+
 def cloud_call(request: Any, response: Any) -> None:
     if request.service == "away":
         response.success, response.error, response.message = False, "unreachable", "cannot reach the platform: try later"
-    elif request.service == "slow":
-        time.sleep(0.5)
+    elif request.service == "quick":
+        quick_ones.release()
+    elif request.service == "slow" and not quick_ones.acquire(timeout=10):
+        response.success, response.error, response.message = False, "bug", "cannot answer before a quick call came"
     response.result = json.dumps({"echo": json.loads(request.arguments), "timeout": request.timeout})
 
 
