@@ -8,14 +8,16 @@ import asyncio
 import logging
 import math
 import secrets
+import socket
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
 
 from tornado.httpclient import HTTPClientError, HTTPRequest, HTTPResponse
-from tornado.iostream import UnsatisfiableReadError
+from tornado.iostream import IOStream, UnsatisfiableReadError
 from tornado.simple_httpclient import HTTPStreamClosedError, HTTPTimeoutError, SimpleAsyncHTTPClient
+from tornado.tcpclient import TCPClient
 
 from rapp_hop import strict_json
 from rapp_hop.errors import Bug, HopError, Invalid, Refused, Unreachable, from_wire
@@ -37,10 +39,13 @@ _BY_STATUS: dict[int, type[HopError]] = {
 class HopClient:
     """A caller of one platform's services; use it inside a running asyncio loop and `close()` it at the end."""
 
-    def __init__(self, base_url: str, token: str | None = None, connect_timeout: float = 5.0) -> None:
+    def __init__(
+        self, base_url: str, token: str | None = None, connect_timeout: float = 5.0, socket_path: Path | None = None
+    ) -> None:
         """Remember where to call; opens nothing yet.
 
         :param base_url: such as http://127.0.0.1:9001
+        :param socket_path: of a UNIX socket on which the platform serves; the URL then only fills the header `Host`
         :param token: sent as `Accept-Token` to that platform only
         :param connect_timeout: seconds
         :raises Invalid: when the URL is not an http(s) URL
@@ -50,6 +55,7 @@ class HopClient:
             raise Invalid(f"cannot call {base_url!r}: give a URL such as http://127.0.0.1:9001")
         self._token = token
         self._connect_timeout = connect_timeout
+        self._socket_path = socket_path
         self._client: SimpleAsyncHTTPClient | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -124,9 +130,16 @@ class HopClient:
         headers = {"Content-Type": kind, "Accept": "application/json"}
         request = HTTPRequest(url, method="POST", headers=headers, body=body)
         if self._client is None:
-            self._client = SimpleAsyncHTTPClient(force_instance=True, max_clients=CLIENTS, max_buffer_size=MAX_ANSWER)
+            self._client = self._connections(max_clients=CLIENTS, max_buffer_size=MAX_ANSWER)
         response = await self._fetch(self._client, request, timeout)
         return _result(url, response)
+
+    def _connections(self, **bounds: int) -> SimpleAsyncHTTPClient:
+        client = SimpleAsyncHTTPClient(force_instance=True, **bounds)
+        if self._socket_path is not None:
+            client.tcp_client.close()
+            client.tcp_client = _SocketClient(self._socket_path)
+        return client
 
     async def _fetch(self, client: SimpleAsyncHTTPClient, request: HTTPRequest, timeout: float) -> HTTPResponse:
         if not (math.isfinite(timeout) and timeout > 0):
@@ -158,7 +171,7 @@ class HopClient:
         )  # fmt: skip
         # An instance of its own: the bound on the body is the client's, not the request's. It is wider than ours, so
         # that the sink sees the first byte too many and can say what was wrong.
-        client = SimpleAsyncHTTPClient(force_instance=True, max_clients=1, max_body_size=limit + OVERRUN)
+        client = self._connections(max_clients=1, max_body_size=limit + OVERRUN)
         loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(IDLE) as silence:
@@ -191,6 +204,21 @@ class HopClient:
             on_error(error)
         else:
             on_result(result)
+
+
+class _SocketClient(TCPClient):
+    """Opens connections to one UNIX socket, whatever host is asked for."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path = path
+
+    async def connect(self, host: str, port: int, *_: Any, max_buffer_size: int | None = None, **__: Any) -> IOStream:
+        """Return a connection to the socket."""
+        line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        stream = IOStream(line, max_buffer_size=max_buffer_size)
+        await stream.connect(str(self._path))
+        return stream
 
 
 async def _body(args: Mapping[str, Any], files: Mapping[str, Path]) -> tuple[str, bytes]:

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any
 
 from tornado.httpserver import HTTPServer
-from tornado.netutil import bind_sockets
+from tornado.netutil import bind_sockets, bind_unix_socket
 from tornado.web import Application, HTTPError, RequestHandler, stream_request_body
 
 from rapp_hop.errors import Bug, HopError, Invalid, Refused
@@ -81,6 +81,17 @@ class HopServer:
             raise Refused(f"cannot listen on {address}:{port}: {error.strerror}, choose another port") from None
         self._http.add_sockets(sockets)
         return int(sockets[0].getsockname()[1])
+
+    def listen_unix(self, path: Path, mode: int = 0o600) -> None:
+        """Listen on a UNIX socket at `path`; a dead one that lies there is replaced.
+
+        :param mode: who may connect
+        :raises Refused: when it cannot be had
+        """
+        try:
+            self._http.add_socket(bind_unix_socket(str(path), mode))
+        except (OSError, ValueError) as error:
+            raise Refused(f"cannot listen on {path}: {error}, choose another path") from None
 
     async def close(self) -> None:
         """Take no new connections, give running calls a moment, end."""

@@ -1,0 +1,46 @@
+"""HOP over a UNIX socket: the same server and client, no port."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from rapp_hop.client import HopClient
+from rapp_hop.errors import Refused, Unreachable
+from rapp_hop.server import HopServer
+from rapp_hop.service import Request, ServiceRegistry, service
+
+
+@service
+def who(request: Request, page: Path) -> str:
+    return f"{request.caller} {page.read_text()}"
+
+
+def test_call_over_a_unix_socket(tmp_path: Path) -> None:
+    async def main() -> None:
+        server = HopServer(ServiceRegistry([who]), {"t" * 20: "nao"}.get, tmp_path / "uploads")
+        server.listen_unix(tmp_path / "hop.sock")
+        assert (tmp_path / "hop.sock").stat().st_mode & 0o777 == 0o600
+        client = HopClient("http://agent", "t" * 20, socket_path=tmp_path / "hop.sock")
+        (tmp_path / "page").write_text("one")
+        assert await client.call("who", {}, {"page": tmp_path / "page"}) == "nao one"
+        await asyncio.gather(*(client.call("who", {}, {"page": tmp_path / "page"}) for _ in range(20)))
+        await server.close()
+        with pytest.raises(Unreachable):
+            await client.call("who", {}, {"page": tmp_path / "page"})
+        await client.close()
+
+    asyncio.run(main())
+
+
+def test_a_path_that_cannot_be_had_is_refused(tmp_path: Path) -> None:
+    async def main() -> None:
+        server = HopServer(ServiceRegistry(), {}.get, tmp_path / "uploads")
+        (tmp_path / "file").write_text("not a socket")
+        for path in (tmp_path / "file", tmp_path / "no" / "folder", tmp_path / ("x" * 200)):
+            with pytest.raises(Refused, match="choose another path"):
+                server.listen_unix(path)
+        assert (tmp_path / "file").read_text() == "not a socket"
+        await server.close()
+
+    asyncio.run(main())
