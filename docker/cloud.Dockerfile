@@ -12,7 +12,7 @@ RUN /usr/bin/python3 -m venv .venv \
 ENV PATH=/opt/rapp/.venv/bin:$PATH PYTHONPATH=/opt/rapp/cloud/src
 COPY cloud cloud
 COPY store store
-COPY docker/cloud docker/cloud
+COPY docker docker
 USER rapp
 VOLUME /data
 EXPOSE 9001
