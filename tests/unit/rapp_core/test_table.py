@@ -16,7 +16,7 @@ from rapp_hop.hz.manifest import CORE_SERVICES as PERMITTED
 ROOT = Path(__file__).parents[3]
 MSGS = ROOT / "catkin_ws" / "src" / "rapp_msgs"
 MODULES = {"communication": communication, "navigation": navigation, "vision": vision}
-LEAVING_THE_RUN = {"CloudCall", "SendMail", "Keep"}
+LEAVING_THE_RUN = {"CloudCall", "StopCloudAgent", "SendMail", "Keep"}
 NOT_OF_THE_CORE = {"HopRequest"}
 NOT_IN_THE_TABLE = {"rapp_say", "rapp_recognize", "rapp_record", "action_client"}
 """The paper's names of functions, and what makes a client."""
