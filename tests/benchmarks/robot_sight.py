@@ -26,6 +26,7 @@ Picture = NDArray[np.uint8]
 
 def looks(stage: Stage) -> list[Result]:
     """A red knob is put where the robot is to look, and found in its picture."""
+    navigation.take_predefined_posture("StandInit")  # the arms down: their orange parts are not to be seen
     beside = []
     for point in POINTS:
         x, y, z, _ = (matrix(stage.pose()) @ [*point, 1.0]).tolist()
@@ -48,7 +49,7 @@ def looks(stage: Stage) -> list[Result]:
 def from_middle(picture: Picture) -> float:
     """Pixels between the red in a picture and its middle; infinite when nothing is red."""
     blue, green, red = (picture[..., layer].astype(int) for layer in range(3))
-    rows, columns = np.nonzero((red > 60) & (red > 2 * np.maximum(blue, green)))
+    rows, columns = np.nonzero((red > 60) & (red > 3 * np.maximum(blue, green)))
     if not len(rows):
         return math.inf
     middle = (picture.shape[1] - 1) / 2, (picture.shape[0] - 1) / 2

@@ -37,6 +37,16 @@ JOINTS = {
     "RAnkleRoll": (-0.769, 0.3978),
 }  # fmt: skip
 """Joints of a NAO and their ranges, rad."""
+PARTS = (
+    *JOINTS, "Head", "LArm", "RArm", "LLeg", "RLeg", "Torso", "CameraTop", "CameraBottom",
+    "MicroFront", "MicroRear", "MicroLeft", "MicroRight", "Accelerometer", "Gyrometer",
+)  # fmt: skip
+"""What `get_transform` knows."""
+PARAMETERS = {
+    0: (0, 255), 1: (16, 64), 2: (0, 255), 3: (-180, 180), 6: (32, 255), 7: (0, 1), 8: (0, 1), 11: (0, 1), 12: (0, 1),
+    17: (1, 2500), 18: (0, 1), 19: (0, 1), 22: (0, 3), 24: (-1, 7), 33: (2700, 6500), 34: (0, 4), 35: (0, 1),
+}  # fmt: skip
+"""Parameters of a NAO's cameras and their ranges; that some exclude each other is not told here."""
 
 Image = NDArray[np.uint8]
 
@@ -130,6 +140,7 @@ class FakeBody:
     def get_transform(self, name: str, space: int) -> Sequence[float]:
         """Upright, half a metre above the ground."""
         self._begin("rapp_get_transform", "get_transform", (name, space))
+        _check(name in PARTS, f"find {name!r} on this robot; give one of {', '.join(PARTS)}")
         _check(space in (0, 1, 2), f"use space {space}: known are 0 torso, 1 world, 2 robot")
         return (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.5 if space else 0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -137,7 +148,7 @@ class FakeBody:
         """The next of `pictures`; a dark one of the wanted size when there is none left."""
         self._begin("rapp_capture_image", "capture_image", camera)
         _check(camera in ("top", "bottom"), f"use camera {camera!r}: known are top, bottom")
-        _check(resolution in SIZES, f"use resolution {resolution}: known are 0 to 3")
+        _check(resolution in SIZES, f"use resolution {resolution}: known are 0 QQVGA, 1 QVGA, 2 VGA, 3 4VGA")
         width, height = SIZES[resolution]
         picture = self._pictures.pop(0) if self._pictures else np.zeros((height, width, 3), np.uint8)
         return picture.shape[1], picture.shape[0], picture.tobytes()
@@ -146,13 +157,16 @@ class FakeBody:
         """Note it."""
         self._begin("rapp_set_camera_param", "set_camera_param", (camera, parameter, value))
         _check(camera in (0, 1), f"use camera {camera}: known are 0 top, 1 bottom")
+        if not _taken(parameter, value):
+            ranges = ", ".join(f"{number} {least} to {most}" for number, (least, most) in PARAMETERS.items())
+            raise Refused(f"cannot set parameter {parameter} to {value}: possible are {ranges}")
 
     def set_camera_params(self, camera: int, parameters: Sequence[int], values: Sequence[int]) -> list[bool]:
-        """Note them; all are taken."""
+        """Note them; those are taken that a NAO has."""
         self._begin("rapp_set_camera_params", "set_camera_params", (camera, dict(zip(parameters, values, strict=False))))
         _check(camera in (0, 1), f"use camera {camera}: known are 0 top, 1 bottom")
         _check(1 <= len(parameters) == len(values) <= 100, "set parameters: give one value for each")
-        return [True] * len(parameters)
+        return [_taken(*pair) for pair in zip(parameters, values, strict=True)]
 
     def action_client(self, name: str) -> "FakeActionClient":
         """A client whose goals end at once."""
@@ -228,6 +242,11 @@ def _compose(frame: Pose, pose: Pose) -> Pose:
     cos, sin = math.cos(frame.theta), math.sin(frame.theta)
     x, y = frame.x + cos * pose.x - sin * pose.y, frame.y + sin * pose.x + cos * pose.y
     return Pose(x, y, math.remainder(frame.theta + pose.theta, math.tau))
+
+
+def _taken(parameter: int, value: int) -> bool:
+    least, most = PARAMETERS.get(parameter, (1, 0))
+    return least <= value <= most
 
 
 def _finite(*values: float) -> bool:

@@ -20,6 +20,8 @@ Service = Any | Callable[[dict[str, Any]], Any]
 RECORDINGS = "/recordings"
 KEEPSAKES = "/keepsakes"
 KEPT_FILE = 8 << 20  # bytes of one kept file
+LANGUAGES = ("en", "pl", "fr", "de", "es", "it", "el", "pt", "nl", "sv", "da", "fi", "cs", "ru", "tr", "ja", "ko", "zh", "ar")
+"""What a NAO may speak; which of them one robot does, depends on its voices."""
 
 
 class FakeCoreAgent(FakeBody):
@@ -77,6 +79,9 @@ class FakeCoreAgent(FakeBody):
     def say(self, text: str, language: str) -> None:
         """Note the text."""
         self._allow("rapp_say", self._core)
+        _check(bool(text.strip()) and len(text) <= 4000, "say that: a text of 1 to 4000 characters is needed")
+        if language.split("-")[0].lower() not in LANGUAGES:
+            raise Refused(f"cannot speak language {language!r}: known are {', '.join(LANGUAGES)}")
         self.calls.append(("say", text))
 
     def recognize(self, dictionary: Sequence[str], timeout: float) -> str:
