@@ -4,6 +4,7 @@ import asyncio
 import json
 import logging
 import os
+import resource
 import signal
 import ssl
 import sys
@@ -23,6 +24,7 @@ from rapp_bridge.node import join
 
 THREADS = 8  # for what asks the master, and for pictures
 LEAVE = 0.7  # s for each part of the end
+SOCKETS = 2  # descriptors for each client, at most: its own, and its share of those to nodes
 
 _log = logging.getLogger(__name__)
 
@@ -37,12 +39,21 @@ def main() -> int:
     except (OSError, UnicodeDecodeError, Invalid) as error:
         _log.error("cannot start: %s", error)
         return 2
+    _make_room(config.clients * SOCKETS)
     with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
         runner.run(_serve(config, gate, tls))
     if not rospy.is_shutdown() and rospy.core.is_initialized():
         _log.warning("the ROS master does not take the farewell; leaving without")
         os._exit(0)  # rospy's own exit handler would wait for the master without bound
     return 0
+
+
+def _make_room(descriptors: int) -> None:
+    """Ask the system for so many descriptors, when it allows fewer; what it does not give, is not used."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != resource.RLIM_INFINITY and soft < descriptors:
+        most = descriptors if hard == resource.RLIM_INFINITY else min(descriptors, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
 def _tls(config: Config) -> ssl.SSLContext | None:

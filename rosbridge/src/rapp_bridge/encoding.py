@@ -91,7 +91,7 @@ def _message_writer(cls: Hashable) -> Write:
                 default(out)
         if found != len(values):
             odd = next(name for name in values if name not in known)
-            raise _Off(f"it has no field {str(odd)[:100]}; it has {', '.join(known) or 'none'}")
+            raise _Off(f"it has no field {odd[:100] if type(odd) is str else _named(odd)}; it has {', '.join(known) or 'none'}")
 
     return write
 

@@ -76,21 +76,17 @@ def _is_key(key: str) -> bool:
 
 def _is_welcome(origin: str, host: str, origins: Sequence[str]) -> bool:
     """Pages of this machine and pages from the bridge's own address are; so nobody's page in a browser reaches the robot."""
-    if "*" in origins or origin in origins:
+    if "*" in origins or origin in origins or _host(origin) == "localhost":
         return True
     try:
-        name = urlsplit(origin).hostname or ""
-        if name == "localhost" or ip_address(name).is_loopback:
-            return True
-    except ValueError:
-        pass
-    return bool(host) and _is_address(host) and origin.partition("://")[2].rpartition(":")[0] == host.rpartition(":")[0]
-
-
-def _is_address(host: str) -> bool:
-    """Whether the request named the bridge by an IP address: a name can be pointed at this machine by anybody."""
-    try:
-        ip_address(urlsplit("//" + host).hostname or "")
-    except ValueError:
+        page = ip_address(_host(origin))
+        return page.is_loopback or page == ip_address(_host("//" + host))
+    except ValueError:  # a name can be pointed at this machine by anybody, so only addresses count as the bridge's own
         return False
-    return True
+
+
+def _host(url: str) -> str:
+    try:
+        return urlsplit(url).hostname or ""
+    except ValueError:
+        return ""

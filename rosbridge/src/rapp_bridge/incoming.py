@@ -30,6 +30,7 @@ from rapp_bridge.protocol import (
 
 _NAME = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*")  # wiki.ros.org/Names
 _COUNT_LIMIT = 1_000_000
+_INTEGERS = range(-(1 << 63), 1 << 64)  # what JSON's readers can take back
 
 
 def parse(frame: str | bytes) -> dict[str, Any]:
@@ -65,7 +66,17 @@ def _get(fields: dict[str, Any], name: str, kinds: tuple[type, ...], default: An
     if value is not default and type(value) not in kinds:
         wanted = " or ".join(kind.__name__ for kind in kinds)
         raise Invalid(f"cannot serve the message: field {name} is {type(value).__name__}, not {wanted}")
+    if type(value) is int and value not in _INTEGERS:
+        raise Invalid(f"cannot serve the message: field {name} is an integer of more than 64 bits")
     return value
+
+
+def id_of(fields: dict[str, Any]) -> Id:
+    """The id of an object whose other fields may be off; None when it has none, or one that is off too."""
+    try:
+        return _id(fields)
+    except Invalid:
+        return None
 
 
 def _text(fields: dict[str, Any], name: str) -> str:

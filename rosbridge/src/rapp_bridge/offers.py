@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import rospy
+from rospy.impl.registration import get_service_manager
 
 from rapp_bridge.blocking import Blocking
 from rapp_bridge.client import Client
@@ -66,6 +67,8 @@ class Offers:
         """Offer a service; one of the same name is replaced, its waiting callers are told so. Raises BridgeError."""
         offered = Offered(client, wish.service, service_class(wish.type))
         name = rospy.resolve_name(wish.service)
+        if name not in self._offered and get_service_manager().get_service(name) is not None:
+            raise Refused(f"cannot advertise {wish.service}: it is the bridge's own; choose another name")
         async with self._change:
             await self._withdraw(name, None)
             self._offered[name] = offered
@@ -169,7 +172,8 @@ def _response(offered: Offered, response: ServiceResponse) -> bytearray | Bridge
     """
     values = response.values
     if not response.result and not (isinstance(values, dict) and values):
-        return Refused(f"cannot call {offered.spelling}: it answered with an error: {values or 'the provider failed'}")
+        text = values if values and isinstance(values, str) else "the provider failed"
+        return Refused(f"cannot call {offered.spelling}: it answered with an error: {text}")
     try:
         return encode({} if values is None else values, offered.cls._response_class)
     except BridgeError as error:

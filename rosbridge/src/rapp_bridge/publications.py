@@ -39,7 +39,7 @@ class _Published:
     latch: bool
     queue_size: int
     publisher: Any
-    clients: set[Client] = field(default_factory=set)
+    clients: set[tuple[Client, str]] = field(default_factory=set)  # and the topic as they wrote it
     links: dict[SubscriberLink, Marker] = field(default_factory=dict)
     opened: float = field(default_factory=time.monotonic)
     unused_since: float = field(default_factory=time.monotonic)
@@ -89,7 +89,7 @@ class Publications:
             return self._advertise(client, name, wish)
         if wish.type not in ("", entry.cls._type):
             raise Invalid(f"cannot advertise {wish.topic} as {wish.type}: it is {entry.cls._type}; use that type")
-        entry.clients.add(client)
+        entry.clients.add((client, wish.topic))
         return None
 
     async def _advertise(self, client: Client, name: str, wish: Advertise) -> None:
@@ -117,8 +117,8 @@ class Publications:
     def unadvertise(self, client: Client, wish: Unadvertise) -> None:
         """Leave the topic's publisher, if there; without clients it lives on for a while, see `sweep`."""
         entry = self._published.get(rospy.resolve_name(wish.topic))
-        if entry is not None and client in entry.clients:
-            entry.clients.discard(client)
+        if entry is not None and (client, wish.topic) in entry.clients:
+            entry.clients.discard((client, wish.topic))
             entry.unused_since = time.monotonic()
 
     async def sweep(self) -> None:
@@ -133,7 +133,7 @@ class Publications:
         """Publish one message; a client that has not advertised the topic does so by this. Raises BridgeError."""
         name = rospy.resolve_name(wish.topic)
         entry = self._published.get(name)
-        if entry is None or client not in entry.clients:
+        if entry is None or (client, wish.topic) not in entry.clients:
             return self._advertise_and_publish(client, wish)
         entry.send(_serialized(wish, entry.cls))
         return None

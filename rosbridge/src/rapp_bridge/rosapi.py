@@ -9,7 +9,7 @@ import rospy
 from rapp_bridge.access import Access
 from rapp_bridge.blocking import Blocking
 from rapp_bridge.clock import now
-from rapp_bridge.errors import BridgeError, Invalid, Unreachable
+from rapp_bridge.errors import BridgeError, Invalid, Refused, Unreachable
 from rapp_bridge.graph import Graph
 from rapp_bridge.local import Local, Locals
 from rapp_bridge.master import Master
@@ -18,6 +18,8 @@ from rapp_bridge.typedefs import full_text, message_typedefs, request_typedefs, 
 
 Fields = dict[str, Any]
 INTEGERS = range(-(1 << 31), 1 << 31)  # of the parameter server's XML-RPC
+UNSPEAKABLE = {*map(chr, range(32)), "\ufffe", "\uffff"} - {"\t", "\n", "\r"}  # in XML 1.0
+DEPTH = 32  # of a parameter's lists and objects
 
 
 class Rosapi:
@@ -122,14 +124,19 @@ class Rosapi:
 
     async def _set_param(self, request: Fields, access: Access) -> Fields:
         value = _parameter(request["value"])
-        await self._param("setParam", request, access, value)
+        ok, _ = await self._param("setParam", request, access, value)
+        if not ok:
+            raise Invalid(f"cannot set the parameter {request['name'][:100]!r}: the ROS master does not take it; check the name")
         return {}
 
     async def _get_param(self, request: Fields, access: Access) -> Fields:
         ok, value = await self._param("getParam", request, access)
         if not ok:
             return {"value": _default(request["default"])}
-        return {"value": orjson.dumps(value, default=str).decode()}
+        try:
+            return {"value": orjson.dumps(value, default=str).decode()}
+        except orjson.JSONEncodeError as error:
+            raise Refused(f"cannot give the parameter {request['name'][:100]!r} as JSON: {error}") from error
 
     async def _has_param(self, request: Fields, access: Access) -> Fields:
         return {"exists": bool((await self._param("hasParam", request, access))[1])}
@@ -187,15 +194,21 @@ def _parameter(text: str) -> Any:
         value = orjson.loads(text)
     except orjson.JSONDecodeError as error:
         raise Invalid(f"cannot set the parameter: its value is no JSON text: {error}") from error
-    _check_parameter(value)
+    _check_parameter(value, DEPTH)
     return value
 
 
-def _check_parameter(value: Any) -> None:
+def _check_parameter(value: Any, depth: int) -> None:
     if value is None or (type(value) is int and value not in INTEGERS):
         raise Invalid("cannot set the parameter: ROS parameters hold no null and only integers of 32 bits")
-    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        _check_parameter(part)
+    if depth == 0:
+        raise Invalid(f"cannot set the parameter: it is nested more than {DEPTH} deep")
+    if isinstance(value, dict):
+        value = [*value, *value.values()]
+    if isinstance(value, str) and not UNSPEAKABLE.isdisjoint(value):
+        raise Invalid("cannot set the parameter: XML, which carries it, has no control characters")
+    for part in value if isinstance(value, list) else ():
+        _check_parameter(part, depth - 1)
 
 
 def _default(text: str) -> str:

@@ -9,7 +9,7 @@ from rapp_bridge.arrival import Arrival, Background, Wire
 from rapp_bridge.errors import BridgeError
 from rapp_bridge.outbox import Outbox
 from rapp_bridge.protocol import Level
-from rapp_bridge.websocket import Frame, close_frame
+from rapp_bridge.websocket import POLICY, Frame, close_frame
 
 HIGH_WATER = 1 << 18  # bytes given to the system at once; what waits beyond them can still be dropped
 TOLD_AGAIN = 1.0  # s between statuses about messages that could not be sent
@@ -20,11 +20,19 @@ _log = logging.getLogger(__name__)
 class Sender:
     """Writes frames in order; topic messages are encoded when their turn comes."""
 
-    def __init__(self, transport: Any, limit: int, background: Background, tell: Callable[[Level, str], None]) -> None:
-        """`limit`: bytes that may wait; `tell` sends a status."""
+    def __init__(
+        self,
+        transport: Any,
+        limit: int,
+        background: Background,
+        tell: Callable[[Level, str], None],
+        end: Callable[[int, str], None],
+    ) -> None:
+        """`limit`: bytes that may wait; `tell` sends a status; `end` closes the connection with a code and a reason."""
         self._transport = transport
         self._background = background
         self._tell = tell
+        self._end = end
         self._limit = limit
         self._writable = True
         self._outbox: Outbox[Frame | tuple[Arrival, Wire]] = Outbox(limit, self._lost)
@@ -43,8 +51,7 @@ class Sender:
             self._write(frame)
         elif not self._outbox.keep(frame, sum(map(len, frame))):
             _log.warning("client disconnected: more than %d bytes of answers waited for it", self._limit)
-            self.close()
-            self._transport.abort()
+            self._end(POLICY, f"cannot keep more than {self._limit} bytes of answers for you; read faster, or ask less")
 
     def offer(self, arrival: Arrival, wire: Wire, queue_length: int) -> None:
         """Write or queue a topic's message."""

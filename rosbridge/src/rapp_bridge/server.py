@@ -18,7 +18,7 @@ from rapp_bridge.protocol import CallService, Level, Message, Publish
 from rapp_bridge.ros import Ros
 from rapp_bridge.sender import Sender
 from rapp_bridge.session import Session
-from rapp_bridge.websocket import CLOSE, NORMAL, PING, POLICY, PONG, TOO_BIG, Reader, Received, ViolationError, frame
+from rapp_bridge.websocket import CLOSE, FAILED, NORMAL, PING, POLICY, PONG, TOO_BIG, Reader, Received, ViolationError, frame
 
 TURN = 0.002  # s that one client's messages are served before others get their turn
 BACKLOG = 1024  # messages read ahead of those that are served
@@ -67,7 +67,7 @@ class Connection(asyncio.Protocol):
         self._loop = asyncio.get_running_loop()
         config = hall.config
         self._session = Session(hall.limits(), hall.gate, hall.resolve, access)
-        self._sender = Sender(transport, config.queue_limit, hall.background, self.tell)
+        self._sender = Sender(transport, config.queue_limit, hall.background, self.tell, self.close)
         self._reader = Reader(config.frame_limit)
         self._received: deque[Received] = deque()
         self._busy = self._turn_is_set = self._over = self._gone = False
@@ -205,7 +205,10 @@ class Connection(asyncio.Protocol):
 
     def _take(self, received: Received) -> None:
         if received.opcode < CLOSE:
-            self._do(self._session.receive(received.data, self._loop.time()))
+            try:
+                self._do(self._session.receive(received.data, self._loop.time()))
+            except Exception:  # noqa: BLE001 - a bug here must not leave the client connected and unheard
+                self._failed()
             if self not in self._hall.clients:
                 self._enter()
         elif received.opcode == PING:
@@ -243,12 +246,18 @@ class Connection(asyncio.Protocol):
             await waiting
         except BridgeError as error:
             self._do(self._session.failed(effect, error))
+        except Exception:  # noqa: BLE001 - as above
+            self._failed()
         finally:
             self._busy = False
             if self._gone:
                 self._hall.work(self._undo(self._session.close()))
             else:
                 self._serve()
+
+    def _failed(self) -> None:
+        _log.exception("a client's message")
+        self.close(FAILED, "cannot go on: the bridge failed on your message; see its log, and report it")
 
     def _answered(self, wish: CallService, outcome: list[Piece] | BridgeError) -> None:
         if not self._gone:

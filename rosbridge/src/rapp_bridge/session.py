@@ -10,7 +10,7 @@ from rapp_bridge.effects import Close, Effect, Limits, Send
 from rapp_bridge.errors import BridgeError, Invalid, Refused
 from rapp_bridge.forms import Piece
 from rapp_bridge.fragments import Fragments
-from rapp_bridge.incoming import decode, parse
+from rapp_bridge.incoming import decode, id_of, parse
 from rapp_bridge.outgoing import cut, service_failure, service_result, status
 from rapp_bridge.protocol import (
     COMPRESSIONS,
@@ -138,8 +138,7 @@ class Session:
     def _bad_frame(self, error: BridgeError, fields: dict[str, Any]) -> list[Effect]:
         if self._access is None:
             return self._turn_away(error)
-        given, service = fields.get("id"), fields.get("service")
-        message_id = given if type(given) is str or type(given) is int else None
+        message_id, service = id_of(fields), fields.get("service")
         if fields.get("op") == "call_service" and type(service) is str:  # its caller waits
             return [Send(service_failure(CallService(cut(service), {}, message_id), str(error)))]
         return self.tell("error", str(error), message_id)

@@ -89,7 +89,7 @@ class _Subscribed:
     name: str
     cls: Any  # None: not known
     subscriber: Any = None
-    wishes: dict[Client, _Wish] = field(default_factory=dict)
+    wishes: dict[tuple[Client, str], _Wish] = field(default_factory=dict)  # by client and the topic as the client wrote it
     sources: dict[str, _Source] = field(default_factory=dict)
     unused_since: float = 0.0
 
@@ -110,10 +110,10 @@ class _Subscribed:
                 wish.take(arrival)
                 behind = wish.client.is_behind
             if behind:
-                self._pace.check(self.wishes)
+                self._pace.check({wish.client for wish in self.wishes.values()})
 
     def tell(self, text: str) -> None:
-        for client in list(self.wishes):
+        for client in {wish.client for wish in self.wishes.values()}:
             client.tell("error", text)
 
 
@@ -144,7 +144,7 @@ class Subscriptions:
     def unsubscribe(self, client: Client, wish: Unsubscribe) -> None:
         """Take the client off the topic, if there; without clients the subscriber lives on for a while, see `sweep`."""
         entry = self._subscribed.get(rospy.resolve_name(wish.topic))
-        if entry is not None and entry.wishes.pop(client, None) is not None:
+        if entry is not None and entry.wishes.pop((client, wish.topic), None) is not None:
             entry.unused_since = time.monotonic()
 
     async def sweep(self) -> None:
@@ -167,7 +167,7 @@ class Subscriptions:
         if entry.cls is not None and wish.type not in (None, entry.cls._type):
             raise Invalid(f"cannot subscribe to {wish.topic} as {wish.type}: it is {entry.cls._type}; use that type")
         wire = Wire(wish.topic, wish.compression, wish.fragment_size)
-        new = entry.wishes[client] = _Wish(client, wire, wish.throttle_rate / 1000, wish.queue_length)
+        new = entry.wishes[client, wish.topic] = _Wish(client, wire, wish.throttle_rate / 1000, wish.queue_length)
         if not wish.again:
             for source in entry.sources.values():
                 if source.latest is not None:

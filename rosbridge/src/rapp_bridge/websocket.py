@@ -12,7 +12,7 @@ _JOINED = 1 << 14  # bytes of a frame up to which its pieces are joined
 _WHOLE = (0x80 | TEXT, 0x80 | BINARY)  # first bytes of frames that are whole messages
 _UNMASKED = b"\0\0\0\0"
 
-NORMAL, GOING_AWAY, PROTOCOL_ERROR, POLICY, TOO_BIG = 1000, 1001, 1002, 1008, 1009
+NORMAL, GOING_AWAY, PROTOCOL_ERROR, POLICY, TOO_BIG, FAILED = 1000, 1001, 1002, 1008, 1009, 1011
 """Codes of a close frame."""
 
 Frame = tuple[Piece, ...]
@@ -58,20 +58,19 @@ class Reader:
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
-        self._waiting: list[bytes] = []  # the beginning of a frame
-        self._have = 0  # bytes of it
+        self._waiting = bytearray()  # the beginning of a frame
         self._need = 2  # bytes before it is worth looking again
         self._opcode = 0  # of a message in several frames
         self._parts: list[bytes] = []
+        self._size = 0  # bytes of the parts
 
     def feed(self, data: bytes) -> list[Received]:
         """All messages and control frames that are complete now; raises ViolationError."""
-        if self._have:
-            self._waiting.append(data)
-            self._have += len(data)
-            if self._have < self._need:
+        if self._waiting:
+            self._waiting += data
+            if len(self._waiting) < self._need:
                 return []
-            data = b"".join(self._waiting)
+            data = bytes(self._waiting)
             self._waiting.clear()
         received: list[Received] = []
         position, end = 0, len(data)
@@ -85,10 +84,7 @@ class Reader:
             mask = data[start - 4 : start]
             self._take(data[position], body if mask == _UNMASKED else unmasked(mask, body), received)
             position = start + size
-        rest = data[position:] if position else data
-        self._have = len(rest)
-        if rest:
-            self._waiting.append(rest)
+        self._waiting += data[position:] if position else data
         return received
 
     def _head(self, data: bytes, position: int, end: int) -> tuple[int, int]:
@@ -129,11 +125,12 @@ class Reader:
             raise ViolationError(PROTOCOL_ERROR, "cannot read frames in this order")
         self._opcode = self._opcode or opcode
         self._parts.append(body)
-        if sum(map(len, self._parts)) > self._limit or len(self._parts) > 1 << 14:
+        self._size += len(body)
+        if self._size > self._limit or len(self._parts) > 1 << 14:
             raise ViolationError(TOO_BIG, f"cannot take a message of more than {self._limit} bytes")
         if first & 0x80:
             received.append(Received(self._opcode, b"".join(self._parts)))
-            self._opcode = 0
+            self._opcode = self._size = 0
             self._parts.clear()
 
 
