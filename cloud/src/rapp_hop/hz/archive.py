@@ -1,11 +1,13 @@
 """HZ archives: `build` a folder into the same bytes every time, `inspect` one, `extract` one into a new folder.
 
 `<name>-<version>.hz` is a gzipped tar with one top folder `<name>/` that holds `package.json` (DESIGN §3.4). The same
-input gives the same bytes wherever the same zlib is used: order, times, owners and modes are fixed.
+input gives the same bytes wherever the same zlib is used: order, times, owners, modes and the gzip header are fixed.
+`etc/weblet.info`, for Hop's own package manager, is made from the manifest, whatever a source has there.
 """
 
 import io
 import os
+import shutil
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,6 +17,7 @@ from typing import BinaryIO
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.manifest import MAX_BYTES, Manifest, parse_manifest
 from rapp_hop.hz.tar import BLOCK, Limits, Member, TarReader, checked_path
+from rapp_hop.hz.weblet import WEBLET_INFO, weblet_info
 
 MANIFEST = "package.json"
 _IGNORED = ("__pycache__",)
@@ -27,6 +30,11 @@ class Contents:
 
     manifest: Manifest
     members: tuple[Member, ...]
+
+    @property
+    def for_hop(self) -> bool:
+        """Whether Hop's own package manager can read what it is (`etc/weblet.info`)."""
+        return any(member.path[1:] == WEBLET_INFO and not member.folder for member in self.members)
 
 
 def package_file_name(name: str, version: str) -> str:
@@ -44,7 +52,7 @@ def build(folder: Path, limits: Limits | None = None) -> bytes:
     try:
         manifest = parse_manifest((folder / MANIFEST).read_bytes())
         packer = zlib.compressobj(9, zlib.DEFLATED, 31)
-        pieces = [packer.compress(piece) for piece in _tar(folder, manifest.name, limits)]
+        pieces = [packer.compress(piece) for piece in _tar(folder, manifest, limits)]
     except OSError as error:
         raise Refused(f"cannot build a package of {folder}: {error.strerror}: {error.filename}") from None
     packed = b"".join([*pieces, packer.flush()])
@@ -63,14 +71,17 @@ def inspect(source: BinaryIO, limits: Limits | None = None) -> Contents:
 def extract(source: BinaryIO, destination: Path, limits: Limits | None = None) -> Contents:
     """Unpack a package into the new folder `destination` (the package's own top folder is not repeated there).
 
-    Every file and folder is on the disk (fsync) when this returns. After an error the folder may hold a part: the
-    caller throws it away.
+    Every file and folder is on the disk (fsync) when this returns. After an error nothing is left.
 
     :raises Invalid: when it is not a right package
     :raises OSError: when the disk is full or read-only, or the folder is there already
     """
     destination.mkdir(mode=0o700)
-    return _read(source, limits or Limits(), destination)
+    try:
+        return _read(source, limits or Limits(), destination)
+    except BaseException:
+        shutil.rmtree(destination, ignore_errors=True)
+        raise
 
 
 def _read(source: BinaryIO, limits: Limits, destination: Path | None) -> Contents:
@@ -140,22 +151,32 @@ def sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
-def _tar(folder: Path, name: str, limits: Limits) -> Iterable[bytes]:
-    yield _header((name,), _FOLDER, 0, b"5", limits)
-    for path in sorted(folder.rglob("*"), key=lambda path: path.relative_to(folder).parts):
+def _tar(folder: Path, manifest: Manifest, limits: Limits) -> Iterable[bytes]:
+    top = (manifest.name,)
+    yield _header(top, _FOLDER, 0, b"5", limits)
+    found = _sources(folder) | {WEBLET_INFO[:1]: None, WEBLET_INFO: None}
+    for parts in sorted(found):
+        path = found[parts]
+        if parts == WEBLET_INFO[:1] or (path is not None and path.is_dir()):
+            yield _header(top + parts, _FOLDER, 0, b"5", limits)
+            continue
+        data = weblet_info(manifest) if path is None else path.read_bytes()
+        mode = _PROGRAM if path is not None and path.stat().st_mode & 0o100 else _PLAIN
+        yield _header(top + parts, mode, len(data), b"0", limits)
+        yield data + bytes(-len(data) % BLOCK)
+    yield bytes(2 * BLOCK)
+
+
+def _sources(folder: Path) -> dict[tuple[str, ...], Path | None]:
+    found: dict[tuple[str, ...], Path | None] = {}
+    for path in folder.rglob("*"):
         parts = path.relative_to(folder).parts
         if any(part in _IGNORED or part.startswith(".") for part in parts):
             continue
         if path.is_symlink() or not (path.is_file() or path.is_dir()):
             raise Invalid(f"cannot build a package: {'/'.join(parts)} is neither a file nor a folder")
-        if path.is_dir():
-            yield _header((name, *parts), _FOLDER, 0, b"5", limits)
-            continue
-        data = path.read_bytes()
-        mode = _PROGRAM if path.stat().st_mode & 0o100 else _PLAIN
-        yield _header((name, *parts), mode, len(data), b"0", limits)
-        yield data + bytes(-len(data) % BLOCK)
-    yield bytes(2 * BLOCK)
+        found[parts] = path
+    return found
 
 
 def _header(parts: tuple[str, ...], mode: int, size: int, kind: bytes, limits: Limits) -> bytes:

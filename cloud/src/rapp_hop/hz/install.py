@@ -140,6 +140,8 @@ class RappFolder:
             manifest = source.unpack(aside)
             if (manifest.name, manifest.version.text) != (name, version):
                 raise Invalid(f"cannot install {name} {version}: the package says it is {manifest.name} {manifest.version}")
+            if manifest.agent == "cloud":
+                raise Refused(f"cannot install {name}: it is a cloud agent, which the platform runs; install its RApp")
             aside.chmod(0o755)
             (self.root / name).mkdir(exist_ok=True)
             aside.rename(self.root / name / version)

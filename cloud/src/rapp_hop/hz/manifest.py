@@ -1,6 +1,6 @@
 """The manifest of a RApp package: `package.json` as a typed, checked value. Pure.
 
-Format of DESIGN §3.4. Keys outside the object `rapp` that we do not know (author, homepage …) are left alone; inside
+Format of DESIGN §3.4. Keys outside the object `rapp` that we do not know (homepage, license …) are left alone; inside
 it they are refused, for there a misspelt key would silently take a permission or a need away.
 """
 
@@ -17,6 +17,7 @@ from rapp_hop.hz.text import NAME, check_name, check_text
 MAX_BYTES = 256 * 1024  # of package.json
 MAX_DEPTH = 6  # containers inside containers
 MAX_DESCRIPTION = 1000  # characters
+MAX_AUTHOR = 100  # characters
 MAX_WORD = 64  # characters of a keyword
 MAX_SENTENCE = 200  # characters
 MAX_LANGUAGES = 32
@@ -68,6 +69,7 @@ class Manifest:
     partner: str | None  # the other package of a four-agent RApp
     needs: Needs
     parameters: Mapping[str, Any]  # handed to the program at its start; any JSON
+    author: str = ""  # who made it, as they say; who signed for it is another matter
 
 
 def parse_manifest(data: bytes) -> Manifest:
@@ -87,7 +89,7 @@ def parse_manifest(data: bytes) -> Manifest:
     if runtime not in RUNTIMES:
         raise Invalid(f"cannot use rapp.runtime {runtime[:40]!r}: known are {', '.join(RUNTIMES)}")
     partner = rapp.get("partner")
-    return Manifest(
+    manifest = Manifest(
         name=check_name(_text(whole, "name", "package.json")),
         version=parse_version(_text(whole, "version", "package.json")),
         description=check_text(_text(whole, "description", "package.json"), MAX_DESCRIPTION, "description"),
@@ -100,7 +102,18 @@ def parse_manifest(data: bytes) -> Manifest:
         partner=None if partner is None else check_name(_text(rapp, "partner", "rapp")),
         needs=_needs(_object(rapp, "needs", "rapp")),
         parameters=_object(rapp, "parameters", "rapp"),
+        author=_author(whole.get("author", "")),
     )
+    _check_kind(manifest)
+    return manifest
+
+
+def _check_kind(manifest: Manifest) -> None:
+    """A cloud agent is started for its dynamic agent: nobody asks for it by voice, and it has no core agent."""
+    if manifest.partner == manifest.name:
+        raise Invalid("cannot use rapp.partner in package.json: it must name another package, such as NAME_cloud")
+    if manifest.agent == "cloud" and (manifest.keywords or manifest.sentences or manifest.permissions.core):
+        raise Invalid("cannot read package.json: a cloud agent has no keywords, no sentences and no permissions.core")
 
 
 def reasons_against(manifest: Manifest, kind: str, api: str) -> list[str]:
@@ -114,6 +127,14 @@ def reasons_against(manifest: Manifest, kind: str, api: str) -> list[str]:
     if not satisfies(api, manifest.needs.api):
         reasons.append(f"it needs API {manifest.needs.api}, this robot has {api}")
     return reasons
+
+
+def _author(value: Any) -> str:
+    """An author as npm and Hop write it: a text, or an object with a name."""
+    name = value.get("name", "") if isinstance(value, dict) else value
+    if not isinstance(name, str):
+        raise Invalid("cannot read package.json: author must be a text")
+    return check_text(name, MAX_AUTHOR, "author") if name else ""
 
 
 def _only(found: Mapping[str, Any], known: set[str], where: str) -> None:
