@@ -53,6 +53,8 @@ def read(words: Sequence[str], env: Mapping[str, str]) -> Config:
         ("frame-limit", int, "bytes of one message from a client"),
         ("frame-rate", int, "messages a client may send in a second"),
         ("names", int, "topics and services one client may hold"),
+        ("calls", int, "calls of one client that may be open at once"),
+        ("requests", int, "calls that may wait at once for one service of a client"),
         ("clients", int, "clients at once"),
         ("linger", float, "seconds that publishers and subscribers outlive their last client"),
         ("entry-timeout", _positive, "seconds a client has for handshake and authentication"),

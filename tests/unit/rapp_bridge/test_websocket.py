@@ -123,6 +123,9 @@ def test_a_token_may_come_with_the_request() -> None:
         ({"Origin": "http://127.0.0.1.evil.example"}, "403"),
         ({"Origin": "http://robot:8000"}, "403"),
         ({"Origin": "http://[::1"}, "403"),
+        ({"Origin": "https://evil.example", "Host": "192.168.1.7"}, "403"),
+        ({"Origin": "null", "Host": "192.168.1.7"}, "403"),
+        ({"Origin": "http://192.168.1.8", "Host": "192.168.1.7"}, "403"),
     ],
 )
 def test_requests_that_are_turned_away(fields: dict[str, str], status: str) -> None:
@@ -146,6 +149,8 @@ def test_a_request_with_doubtful_lines_is_turned_away(line: str) -> None:
         ("https://[::1]:44", "robot:9090"),
         ("https://friend.example", "robot:9090"),
         ("http://192.168.1.7:8000", "192.168.1.7:9090"),
+        ("https://192.168.1.7", "192.168.1.7"),
+        ("http://[fe80::7]:8000", "[fe80::7]:9090"),
     ],
 )
 def test_pages_that_are_welcome(origin: str, host: str) -> None:
