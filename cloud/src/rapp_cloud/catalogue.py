@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from rapp_hop.errors import Refused
 from rapp_hop.hz.manifest import Manifest, reasons_against
 
 
@@ -43,13 +44,41 @@ class Entry:
 def catalogue(manifests: Iterable[Manifest], robot: RobotKind) -> list[Entry]:
     """Return the newest version of each RApp that starts on a robot, sorted by name; releases go before pre-releases.
 
-    Packages of cloud agents are no RApps of their own and are left out.
+    Packages of cloud agents are no RApps of their own and are left out; without its own, a four-agent RApp cannot run.
     """
+    manifests = list(manifests)
+    cloud = {(manifest.name, manifest.version.text) for manifest in manifests if manifest.agent == "cloud"}
     newest: dict[str, Manifest] = {}
     for manifest in manifests:
         if manifest.agent == "dynamic" and _rank(manifest) > _rank(newest.get(manifest.name)):
             newest[manifest.name] = manifest
-    return [Entry(newest[name], tuple(reasons_against(newest[name], robot.kind, robot.api_version))) for name in sorted(newest)]
+    found = (newest[name] for name in sorted(newest))
+    return [Entry(each, tuple(reasons_against(each, robot.kind, robot.api_version) + _alone(each, cloud))) for each in found]
+
+
+def cloud_agent_of(manifests: Iterable[Manifest], rapp: str, version: str) -> Manifest:
+    """Return the manifest of the cloud agent of a RApp in that version; both packages carry the same one (P29).
+
+    :raises Refused: there is none
+    """
+    there = {(manifest.name, manifest.version.text): manifest for manifest in manifests}
+    own = there.get((rapp, version))
+    if own is None or own.agent != "dynamic":
+        raise Refused(f"cannot start a cloud agent for {rapp[:70]} {version[:70]}: the store has no such RApp")
+    if own.partner is None:
+        raise Refused(f"cannot start a cloud agent for {rapp}: its package.json names no partner")
+    found = there.get((own.partner, version))
+    if found is None or found.agent != "cloud":
+        raise Refused(f"cannot start a cloud agent for {rapp}: {_alone(own, set())[0]}")
+    if found.partner not in (None, rapp):
+        raise Refused(f"cannot start {found.name} for {rapp}: its package.json says it is the partner of {found.partner}")
+    return found
+
+
+def _alone(manifest: Manifest, cloud: set[tuple[str, str]]) -> list[str]:
+    if manifest.partner is None or (manifest.partner, manifest.version.text) in cloud:
+        return []
+    return [f"its cloud agent {manifest.partner} {manifest.version.text} is not in the store"]
 
 
 def commands(entries: Iterable[Entry], language: str) -> dict[str, tuple[str, ...]]:

@@ -40,6 +40,10 @@ class Robots:
         self.register(robot, found.kind)
         return True
 
+    def is_here(self, robot: str) -> bool:
+        """Tell whether a robot's lease holds."""
+        return self._alive(robot) is not None
+
     def kind_of(self, robot: str) -> RobotKind:
         """Return what a robot is.
 

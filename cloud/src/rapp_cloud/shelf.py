@@ -12,12 +12,12 @@ import fcntl
 import hashlib
 import io
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from securesystemslib.signer import Signer
 from tuf.api.exceptions import RepositoryError
@@ -34,7 +34,7 @@ from tuf.api.metadata import (  # type: ignore[attr-defined]  # public, but not 
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import ROLES, load_keys, make_keys
 from rapp_hop.errors import Bug, Invalid, Refused, Unreachable
-from rapp_hop.hz.archive import inspect, package_file_name
+from rapp_hop.hz.archive import Contents, extract, inspect, package_file_name
 from rapp_hop.hz.manifest import Manifest
 from rapp_hop.hz.tar import Limits
 
@@ -139,12 +139,26 @@ class Shelf:
                 self._manifests[path] = self._manifest(target)
         return [self._manifests[path] for path in sorted(targets)]
 
+    def unpack(self, name: str, version: str, folder: Path) -> None:
+        """Unpack a package on offer into a new folder.
+
+        :raises Refused: there is none of that name and version
+        :raises Bug: as for `manifests`
+        """
+        target = self._state()[2].targets.get(package_file_name(name, version))
+        if target is None:
+            raise Refused(f"cannot find {name} {version}: it is not in the store")
+        self._read(target, lambda file: extract(file, folder, self._limits))
+
     def _manifest(self, target: TargetFile) -> Manifest:
+        return self._read(target, lambda file: inspect(file, self._limits)).manifest
+
+    def _read(self, target: TargetFile, read: Callable[[BinaryIO], Contents]) -> Contents:
         try:
             with (self.targets / f"{target.hashes['sha256']}.{target.path}").open("rb") as file:
                 target.verify_length_and_hashes(file)
                 file.seek(0)
-                return inspect(file, self._limits).manifest
+                return read(file)
         except (OSError, RepositoryError, Invalid) as error:
             raise Bug(f"cannot read {target.path} on the shelf: {error}, restore it from a backup") from None
 

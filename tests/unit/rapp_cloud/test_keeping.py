@@ -41,9 +41,7 @@ def test_a_token_taken_away_counts_no_more(tmp_path: Path) -> None:
     assert accounts.robot_of(token) is None
 
 
-@pytest.mark.parametrize(
-    "text", ["[]", '{"short": "nao"}', '{"xxxxxxxxxxxxxxxxxxxx": 3}', '{"xxxxxxxxxxxxxxxxxxxx": "../x"}', "{"]
-)
+@pytest.mark.parametrize("text", ["[]", '{"short": "nao"}', '{"xxxxxxxxxxxxxxxxxxxx": 3}', '{"xxxxxxxxxxxxxxxxxxxx": "../x"}', "{"])
 def test_broken_token_files(tmp_path: Path, text: str) -> None:
     (tmp_path / "tokens.json").write_text(text)
     with pytest.raises(Invalid):

@@ -67,6 +67,18 @@ def test_what_is_published_arrives_verified(shelf: Shelf, robot: TrustedStore, t
     assert [manifest.name for manifest in shelf.manifests()] == ["hello"]
 
 
+def test_a_package_is_unpacked_for_the_platform_itself(shelf: Shelf, tmp_path: Path) -> None:
+    shelf.publish(package(tmp_path, program="pass\n"))
+    shelf.unpack("hello", "1.0.0", tmp_path / "there")
+    assert (tmp_path / "there" / "agent.py").read_text() == "pass\n"
+    with pytest.raises(Refused, match="not in the store"):
+        shelf.unpack("hello", "2.0.0", tmp_path / "other")
+    (target,) = shelf.targets.iterdir()
+    target.write_bytes(target.read_bytes()[:-1] + b"?")
+    with pytest.raises(Bug, match="backup"):
+        shelf.unpack("hello", "1.0.0", tmp_path / "changed")
+
+
 def test_s20_the_same_version_with_other_bytes(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
     shelf.publish(package(tmp_path))
     before = version_of(shelf.metadata / "timestamp.json")

@@ -107,3 +107,12 @@ def test_s19_two_installations_at_once(rapps: RappFolder, tmp_path: Path) -> Non
         thread.join()
     assert sorted(new) == [False] * 5 + [True]
     assert rapps.find("hello") is not None
+
+
+def test_a_cloud_agent_is_not_installed(rapps: RappFolder, tmp_path: Path) -> None:
+    source = source_folder(tmp_path / "src", "hello", agent="cloud", keywords={}, sentences={}, permissions={})
+    (tmp_path / "hello.hz").write_bytes(build(source))
+    with pytest.raises(Refused, match="which the platform runs"):
+        install(PackageFile(tmp_path / "hello.hz", "hello", "1.0.0", Limits()), rapps)
+    assert rapps.find("hello") is None
+    assert [path.name for path in rapps.root.iterdir()] == [".lock"]

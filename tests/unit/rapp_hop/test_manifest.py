@@ -158,3 +158,22 @@ def test_conditions() -> None:
     assert not satisfies("0.9", ">=1.0, <2.0")
     with pytest.raises(Invalid, match="API version"):
         satisfies("one", ">=1.0")
+
+
+def cloud(**change: Any) -> dict[str, Any]:
+    return manifest(
+        "hello_cloud", **{"agent": "cloud", "keywords": {}, "sentences": {}, "permissions": {"cloud": ["profile"]}, **change}
+    )
+
+
+def test_a_cloud_agent_has_no_voice_and_no_robot() -> None:
+    assert read(cloud()).permissions.cloud == ("profile",)
+    for change in ({"keywords": {"en": ["x"]}}, {"sentences": {"en": ["x"]}}, {"permissions": {"core": ["rapp_say"]}}):
+        with pytest.raises(Invalid, match="a cloud agent has no"):
+            read(cloud(**change))
+
+
+def test_a_package_is_not_its_own_partner() -> None:
+    assert read(manifest(partner="hello_cloud")).partner == "hello_cloud"
+    with pytest.raises(Invalid, match="must name another package"):
+        read(manifest(partner="hello"))
