@@ -57,42 +57,42 @@ class Fuzz:
     """Makes frames."""
 
     def __init__(self, seed: int) -> None:
-        self._random = random.Random(seed)
+        self.random = random.Random(seed)
 
     def frame(self) -> tuple[bytes, bool]:
         """A frame's payload, and whether it is to go as a binary one."""
-        fields = deepcopy(self._random.choice(MESSAGES))
-        for _ in range(self._random.choice((0, 1, 1, 2, 4))):
+        fields = deepcopy(self.random.choice(MESSAGES))
+        for _ in range(self.random.choice((0, 1, 1, 2, 4))):
             self._change(fields)
-        is_cbor = self._random.random() < 0.4
+        is_cbor = self.random.random() < 0.4
         data = cbor2.dumps(fields) if is_cbor else json.dumps(fields).encode()
-        for _ in range(self._random.choice((0, 0, 1, 1, 3))):
+        for _ in range(self.random.choice((0, 0, 1, 1, 3))):
             data = self._damaged(data)
-        return data, is_cbor or self._random.random() < 0.1
+        return data, is_cbor or self.random.random() < 0.1
 
     def _change(self, fields: dict[str, Any]) -> None:
         """Replace, remove or add a field, at any depth."""
         place: Any = fields
-        while isinstance(place, dict) and place and self._random.random() < 0.5:
-            inner = self._random.choice(list(place.values()))
+        while isinstance(place, dict) and place and self.random.random() < 0.5:
+            inner = self.random.choice(list(place.values()))
             if not isinstance(inner, dict):
                 break
             place = inner
-        name = self._random.choice([*place, "op", "extra", "header"])
-        if self._random.random() < 0.2:
+        name = self.random.choice([*place, "op", "extra", "header"])
+        if self.random.random() < 0.2:
             place.pop(name, None)
         else:
-            place[name] = deepcopy(self._random.choice(VALUES))
+            place[name] = deepcopy(self.random.choice(VALUES))
 
     def _damaged(self, data: bytes) -> bytes:
-        at = self._random.randrange(len(data) + 1)
-        match self._random.randrange(5):
+        at = self.random.randrange(len(data) + 1)
+        match self.random.randrange(5):
             case 0:
                 return data[:at]
             case 1:
-                return data[:at] + bytes([self._random.randrange(256)]) + data[at + 1 :]
+                return data[:at] + bytes([self.random.randrange(256)]) + data[at + 1 :]
             case 2:
-                return data[:at] + self._random.choice(WORDS) + data[at:]
+                return data[:at] + self.random.choice(WORDS) + data[at:]
             case 3:
                 return data[:at] + data[at // 2 :]
             case _:

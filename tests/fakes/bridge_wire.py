@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 from fakes.bridge_neighbours import PATIENCE
 
-TEXT, BINARY, CLOSE, PING = 1, 2, 8, 9
+TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 CUT = 1006
 """The code of a connection that ended without a close frame (RFC 6455, section 7.1.5)."""
 
@@ -86,11 +86,17 @@ class Wire:
 
     async def receive(self, op: str) -> dict[str, Any]:
         """The next JSON message of this kind; others are passed over."""
+        while (message := await self.receive_any())["op"] != op:
+            pass
+        return message
+
+    async def receive_any(self) -> dict[str, Any]:
+        """The next JSON message."""
         while (found := await self.frame()) is not None:
-            if found[0] == TEXT and (message := json.loads(found[1]))["op"] == op:
-                return dict(message)
+            if found[0] == TEXT:
+                return dict(json.loads(found[1]))
             assert found[0] != CLOSE, found
-        raise AssertionError(f"the bridge closed the connection before any {op}")
+        raise AssertionError("the bridge cut the connection")
 
     async def settle(self) -> None:
         """Wait until the bridge has served all that was sent before: frames are served in order."""
