@@ -34,7 +34,8 @@ def main(url: str, token: str, folder: Path) -> None:
     lease = Lease(config)
     connection = Connection(url, config.naoqi_timeout)
     join("body_half", stop)
-    executor = Executor(Context(robot(connection, config), config, trace, folder))
+    context = Context(robot(connection, config), config, trace, folder)
+    executor = Executor(context)
     RosServices(executor, Outside(RosHop(stop, trace), config, stop), Keepsakes(config), lease, trace)
     RosActions(executor, lease, trace)
     permissions = {"core": [row.name for row in CORE_SERVICES], "cloud": []}
@@ -45,7 +46,7 @@ def main(url: str, token: str, folder: Path) -> None:
     print("READY " + json.dumps({}), flush=True)
     for _line in sys.stdin:
         lease.release()
-        print(executor.take_moved(), flush=True)
+        print(context.calls.take_before() is not None, flush=True)
         lease.grant(agent)
     stop.set()
     connection.close()

@@ -198,6 +198,19 @@ def test_without_a_master_it_waits_and_can_be_ended(ros_env, tmp_path):
         assert process.wait(10) == 0
 
 
+def test_it_joins_a_master_that_comes_after_it(own_master, tmp_path):
+    own_master.stop()
+    words = [sys.executable, "-m", "rapp_core", "--robot", "tcp://127.0.0.1:1", "--home", str(tmp_path / "home")]
+    with subprocess.Popen(words, env=own_master.env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert "cannot reach the ROS master" in process.stderr.readline()
+            own_master.start()
+            assert process.stdout.readline().startswith("READY ")
+        finally:
+            process.terminate()
+        assert process.wait(PATIENCE) == 0
+
+
 @pytest.mark.parametrize("frozen", [False, True])
 def test_it_ends_whatever_the_ros_master_does(start, own_master, tmp_path, frozen):
     core = start("rapp_core", "--robot", "tcp://127.0.0.1:1", "--home", str(tmp_path / "home"), env=own_master.env)

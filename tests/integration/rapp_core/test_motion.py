@@ -191,6 +191,17 @@ def test_an_obstacle_ahead_stops_a_walk_and_is_named(half):
         half.world.removeObject("carton")
 
 
+def test_a_walk_with_a_velocity_starts_from_stand_init_and_does_not_block(half):
+    posture, start = half.connection.service("ALRobotPosture"), half.world.getRobotPose()
+    assert posture.goToPosture("Sit", 1.0)
+    half.client("navigation.move_vel(0.05, 0.0, 0.0); tell('back')").rest()
+    half.until(lambda: posture.getPosture() == "StandInit")
+    assert math.dist(start[:2], half.world.getRobotPose()[:2]) < 0.03
+    half.until_walking()
+    half.client("navigation.move_stop()").rest()
+    half.until(half.still)
+
+
 def test_the_end_of_the_lease_ends_a_walk(half):
     client = half.client(WALK)
     half.until_walking()

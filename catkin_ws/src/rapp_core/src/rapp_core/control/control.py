@@ -208,8 +208,8 @@ class Control:
             run.dismantle(parts.config.dismantle if run.outcome is not None else HURRIED, parts.stop)
         parts.lease.release()
         self._still()
-        if parts.executor.take_moved():
-            self._let_rest()
+        parts.executor.put_back()
+        self._close_senses()
         self._end_run()
         parts.launcher.prepare()
 
@@ -256,16 +256,19 @@ class Control:
             resting.wait(RESTING)
 
     def _let_rest(self) -> Movement | None:
-        """Release what the RApp has used of the body; the robot goes on by itself, and is not waited for."""
-        robot = self._parts.robot
+        """Release the body; the robot goes on by itself."""
         try:
-            return robot.motion.release()
+            return self._parts.robot.motion.release()
         except CoreError as error:
             _log.warning("%s", error)
             return None
         finally:
-            robot.camera.close()
-            robot.feeling.close()
+            self._close_senses()
+
+    def _close_senses(self) -> None:
+        """Let what the robot sees and feels for us be idle."""
+        self._parts.robot.camera.close()
+        self._parts.robot.feeling.close()
 
     def _present(self) -> Agent:
         assert self._run is not None

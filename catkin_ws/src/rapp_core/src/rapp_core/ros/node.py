@@ -12,6 +12,7 @@ from rapp_core.errors import Unreachable
 
 _log = logging.getLogger(__name__)
 STEP = 0.05  # s between two looks
+MASTER = 0.3  # s between two looks for a master
 FAREWELL = 1.0  # s
 FORMAT = "%(asctime)s %(name)s %(levelname)s %(message)s"
 
@@ -24,7 +25,7 @@ def log_to_stderr() -> None:
 def join(name: str, stop: threading.Event) -> bool:
     """Become a node once there is a master; gives False when `stop` was set before that. Raises Unreachable."""
     outcome: queue.SimpleQueue[rospy.ROSException | None] = queue.SimpleQueue()
-    threading.Thread(target=_enter, args=(name, outcome), name="join", daemon=True).start()
+    threading.Thread(target=_enter, args=(name, stop, outcome), name="join", daemon=True).start()
     while not stop.is_set():
         try:
             error = outcome.get(timeout=STEP)
@@ -37,9 +38,13 @@ def join(name: str, stop: threading.Event) -> bool:
     return False
 
 
-def _enter(name: str, outcome: "queue.SimpleQueue[rospy.ROSException | None]") -> None:
+def _enter(name: str, stop: threading.Event, outcome: "queue.SimpleQueue[rospy.ROSException | None]") -> None:
+    """rospy itself waits for a master only when there is something to register, and fails at once when there is nothing yet."""
     if not rosgraph.is_master_online():
         _log.warning("cannot reach the ROS master at %s: waiting for it; start roscore", rosgraph.get_master_uri())
+        while not rosgraph.is_master_online():
+            if stop.wait(MASTER):
+                return
     try:
         rospy.init_node(name, disable_signals=True, disable_rosout=True)
         outcome.put(None)

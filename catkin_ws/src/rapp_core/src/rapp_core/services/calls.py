@@ -19,6 +19,8 @@ class Call:
         self.feedback = feedback
         self.yields = False
         """Whether it gives way to the next call that wants one of its limbs."""
+        self.puts_back = False
+        """Whether it is the core agent's own, which leaves the robot as a RApp has found it."""
         self._reason: str | None = None
 
     def end(self, reason: str) -> None:
@@ -38,12 +40,12 @@ class Call:
 
 
 class Calls:
-    """All calls that move the robot at this moment, and whether any has since the last `take_moved`."""
+    """All calls that move the robot at this moment, and how the robot was before any had since the last `take_before`."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._open: list[tuple[Call, frozenset[str]]] = []
-        self._moved = False
+        self._before: str | None = None
 
     @contextmanager
     def entered(self, call: Call, limbs: Sequence[str]) -> Iterator[None]:
@@ -68,14 +70,19 @@ class Calls:
             if (call.yields or everyone) and limb in taken and call is not newcomer:
                 call.end(reason)
 
-    def note_moved(self) -> None:
-        """The robot is made to move."""
-        self._moved = True
+    def note_before(self, posture: Callable[[], str]) -> None:
+        """The robot is about to be made to move; the first one counts."""
+        if self._before is None:
+            self._before = posture()
 
-    def take_moved(self) -> bool:
-        """Whether the robot was made to move since this was asked the last time."""
-        moved, self._moved = self._moved, False
-        return moved
+    def take_before(self) -> str | None:
+        """The posture before the robot was made to move; None when it was not since this was asked the last time."""
+        before, self._before = self._before, None
+        return before
+
+    def keep_before(self, posture: str) -> None:
+        """The robot has not come back to a posture that was taken from here; whatever was noted since counts less."""
+        self._before = posture
 
     def _now(self) -> list[tuple[Call, frozenset[str]]]:
         with self._lock:

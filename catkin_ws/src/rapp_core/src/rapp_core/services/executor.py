@@ -12,6 +12,7 @@ from rapp_core.errors import CoreError, Refused
 from rapp_core.launcher.lease import Grant
 from rapp_core.services.calls import Call
 from rapp_core.services.context import Context, Reply, execute, subsystem
+from rapp_core.services.posture import comes_back
 from rapp_core.services.table import CORE_SERVICES, CoreService
 
 PATIENCE = 10.0  # s a call waits for a resource another call holds
@@ -55,9 +56,30 @@ class Executor:
             with self._lock:
                 self._running -= 1
 
-    def take_moved(self) -> bool:
-        """Whether a service has moved the robot since this was asked the last time."""
-        return self._context.calls.take_moved()
+    def put_back(self) -> None:
+        """Leave the robot as it was before a service has moved it the first time, or at rest, its motors off.
+
+        Goes on beside the caller, and makes way for whatever else is to move the robot; nothing when no service has.
+        """
+        before = self._context.calls.take_before()
+        if before is None:
+            return
+        try:
+            if comes_back(self._context, before):
+                self._aside(lambda: self._come_back(before))
+            else:
+                self._context.robot.motion.release()
+        except CoreError as error:
+            _log.warning("%s", error)
+
+    def _come_back(self, before: str) -> None:
+        call = Call()
+        call.yields = call.puts_back = True
+        try:
+            self._execute("rapp_rest", {"posture": before}, replace(self._context, call=call), preempt=True)
+        except CoreError as error:
+            _log.info("the robot is not back in posture %s: %s", before, error)
+            self._context.calls.keep_before(before)
 
     def run(self, name: str, /, **request: Any) -> Reply:
         """Execute one service for the core agent itself; gives its reply. Raises CoreError."""

@@ -57,7 +57,8 @@ def motion(
     telling = Every(context, TELLING)
 
     def enter(share: Subsystem) -> None:
-        context.calls.note_moved()
+        if not context.call.puts_back:
+            context.calls.note_before(context.robot.motion.posture)
         movement = begin(share)
         share.memory.update(movement=movement, wait=movement.wait, undo=lambda: cancel(movement), arrived=False)
         share.memory["late"] = context.now() + context.config.motion_time

@@ -42,6 +42,15 @@ def machine(context: Context) -> Machine:
     )
 
 
+def comes_back(context: Context, before: str) -> bool:
+    """Whether a robot is to be brought back to the posture in which it was before, then its motors off; else it just rests.
+
+    A posture on straight legs needs motors, and a robot that has fallen is not made to get up unasked. Raises CoreError.
+    """
+    robot = context.robot
+    return before in RESTING and before != robot.motion.posture() and not robot.feeling.senses().fallen
+
+
 def rest_machine(context: Context) -> Machine:
     """Sub-FSM: check, take the resting posture, switch the motors off."""
 

@@ -12,6 +12,7 @@ CAMERAS = {"top": 0, "bottom": 1}
 BGR = 13  # NAOqi's number of the colour space
 FAST, SLOW = 30, 5  # pictures/s to ask for: up to VGA, and above
 VGA = 2
+RESOLUTIONS = range(4)  # to 4VGA
 LAYERS = 3
 TRIES = 2  # the first picture after a camera has been woken may not be there yet
 
@@ -75,10 +76,19 @@ class NaoqiCamera:
             self._handles.clear()
         key = (camera, resolution)
         if key not in self._handles:
-            name = f"{self._name}_{camera}_{resolution}"
+            name = _subscription(self._name, camera, resolution)
             rate = FAST if resolution <= VGA else SLOW
             self._handles[key] = str(self._connection.call("ALVideoDevice", "subscribeCamera", name, camera, resolution, BGR, rate))
         return self._handles[key]
+
+
+def subscriptions(name: str) -> list[str]:
+    """All names under which the cameras may have been subscribed for `name`."""
+    return [_subscription(name, camera, resolution) for camera in CAMERAS.values() for resolution in RESOLUTIONS]
+
+
+def _subscription(name: str, camera: int, resolution: int) -> str:
+    return f"{name}_{camera}_{resolution}"
 
 
 def _picture(image: Any, camera: str) -> Picture:

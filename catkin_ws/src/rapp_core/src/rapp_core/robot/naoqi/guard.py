@@ -1,9 +1,9 @@
 """Stops the robot when its core agent is gone (DESIGN section 3.1): a small process beside the core agent that outlives it.
 
 The core agent holds one end of a pipe that nobody else has; the kernel closes it when the core agent ends, however that comes.
-Then the guard stops motion, speech, playing, recording and listening, twice, since what the core agent had just asked for may reach
-the robot after the first time; and ends. It speaks NAOqi only, and works the same on a robot and on the simulator. A NAO does not
-stop by itself what a client has started that is gone.
+Then the guard stops motion, speech, playing, recording, listening and looking, twice, since what the core agent had just asked for
+may reach the robot after the first time; and ends. It speaks NAOqi only, and works the same on a robot and on the simulator. A NAO
+does not stop by itself what a client has started that is gone.
 """
 
 import argparse
@@ -19,6 +19,7 @@ import time
 from pathlib import Path
 
 from rapp_core.errors import CoreError, Refused
+from rapp_core.robot.naoqi.camera import subscriptions
 from rapp_core.robot.naoqi.connection import Connection
 
 AGAIN = 0.3  # s between the two times
@@ -123,6 +124,8 @@ def stops(subscriber: str) -> list[tuple[str, ...]]:
         ("ALAudioRecorder", "stopMicrophonesRecording"),
         ("ALSpeechRecognition", "unsubscribe", subscriber),
         ("ALSoundDetection", "unsubscribe", subscriber),
+        ("ALSonar", "unsubscribe", subscriber),
+        *(("ALVideoDevice", "unsubscribeAllInstances", name) for name in subscriptions(subscriber)),
     ]
 
 
