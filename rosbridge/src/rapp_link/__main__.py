@@ -12,6 +12,7 @@ from pathlib import Path
 
 from rapp_hop.errors import HopError, Refused
 from rapp_hop.hz.delivery import Delivery
+from rapp_link.agents import CloudAgents
 from rapp_link.cloud_side import Platform
 from rapp_link.commands import Commands, sign_of_life
 from rapp_link.config import Config, read
@@ -48,16 +49,17 @@ class Link:
         self.platform = Platform(self.client, config, reports)
         self.postman = Postman(outbox, TellingSender(SmtpSender(config.mail), self._tell), config.mail)
         delivery = Delivery(self.client, config.root, config.home) if config.root else None
-        commands = Commands(config, self.platform, delivery, outbox, self.postman, reports).table()
+        self.agents = CloudAgents(self.platform)
+        commands = Commands(config, self.platform, delivery, outbox, self.postman, reports, self.agents).table()
         self.office = Office(JobTable(config.jobs, config.longest), commands, lambda event: self.ros.tell(event))
-        self.ros = RosSide(config.bridge, list(commands), self.office.request, self.office.cancel)
+        self.ros = RosSide(config.bridge, list(commands), self.office.request, self.office.cancel, self.agents.keep)
 
     async def run(self, stop: asyncio.Event) -> None:
         """Serve until `stop` is set."""
         self.ros.open()
         try:
             async with asyncio.TaskGroup() as group:
-                tasks = [group.create_task(self.platform.run())]
+                tasks = [group.create_task(self.platform.run()), group.create_task(self.agents.run())]
                 if self.config.mail.host:
                     tasks.append(group.create_task(self.postman.run()))
                 life = sign_of_life(self.ros.alive, self.platform, self.boot, self.config.alive)

@@ -11,10 +11,11 @@ from typing import Any
 from rapp_hop import strict_json
 from rapp_hop.errors import Invalid, Refused, Unreachable
 from rapp_hop.hz.delivery import Delivery
+from rapp_link.agents import CloudAgents
 from rapp_link.cloud_side import Identity, Platform
 from rapp_link.config import Config
 from rapp_link.disk import Disk, replace_whole
-from rapp_link.files import read_shared, shared_file
+from rapp_link.files import read_shared, shared_file, sorted_out
 from rapp_link.letter import Letter
 from rapp_link.message import Attachment, Mail, build
 from rapp_link.office import Command, Ticket
@@ -41,6 +42,7 @@ class Commands:
         outbox: Outbox,
         postman: Postman,
         reports: Reports,
+        agents: CloudAgents,
     ) -> None:
         """Take the parts.
 
@@ -52,6 +54,7 @@ class Commands:
         self._outbox = outbox
         self._postman = postman
         self._reports = reports
+        self._agents = agents
         self._list = config.home / "link" / "rapps.json"
 
     def table(self) -> Mapping[str, Command]:
@@ -62,6 +65,8 @@ class Commands:
             "interpret": self.interpret,
             "install": self.install,
             "remove": self.remove,
+            "start_cloud_agent": self.start_cloud_agent,
+            "stop_cloud_agent": self.stop_cloud_agent,
             "call": self.call,
             "send_mail": self.send_mail,
             "report": self.report,
@@ -112,12 +117,28 @@ class Commands:
         (name,) = take(arguments, name=str)
         return {"removed": await self._store().remove(name)}
 
+    async def start_cloud_agent(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
+        """{rapp, version, run} → {agent}: the name by which `call` knows it."""
+        rapp, version, run = take(arguments, rapp=str, version=str, run=str)
+        return {"agent": await self._agents.start(rapp, version, run, ticket.remaining)}
+
+    async def stop_cloud_agent(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
+        """{run} → {stopped}; nothing of it runs any more then."""
+        (run,) = take(arguments, run=str)
+        return {"stopped": await self._agents.stop(run, ticket.remaining)}
+
     async def call(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
-        """{service, arguments} → what the platform's service returns."""
-        service, values = take(arguments, service=str, arguments=dict)
-        if not _SERVICE.fullmatch(service):
+        """{service, arguments, agent} → what the service returns: the platform's, or, with `agent`, that cloud agent's.
+
+        An argument {"file": path} is a file to send.
+        """
+        service, values, agent = take({"agent": "", **arguments}, service=str, arguments=dict, agent=str)
+        if not _SERVICE.fullmatch(service) or (agent and "/" in service):
             raise Refused(f"cannot call {service[:60]!a}: give a service's name")
-        return await self._platform.call(service, values, ticket.remaining)
+        if agent:
+            service = f"{await self._agents.address(agent, ticket.remaining)}/{service}"
+        plain, files = await in_thread(sorted_out, self._config.home, values)
+        return await self._platform.call(service, plain, ticket.remaining, **files)
 
     async def send_mail(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
         """{recipients, subject, body, attachment, message_id} → {state: delivered | kept | locked, message_id}.

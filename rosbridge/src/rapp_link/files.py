@@ -2,7 +2,9 @@
 
 import os
 import stat
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from rapp_hop.errors import Refused
 
@@ -23,6 +25,16 @@ def shared_file(home: Path, text: str) -> Path:
     if not path.is_file():
         raise Refused(f"cannot use the file {text[:200]}: there is no such file")
     return path
+
+
+def sorted_out(home: Path, arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Path]]:
+    """Return the plain arguments of a call, and its files: those that are {"file": path}.
+
+    :raises Refused: see `shared_file`
+    """
+    named = {name: value["file"] for name, value in arguments.items() if isinstance(value, dict) and value.keys() == {"file"}}
+    files = {name: shared_file(home, path) for name, path in named.items() if isinstance(path, str)}
+    return {name: value for name, value in arguments.items() if name not in files}, files
 
 
 def read_shared(home: Path, text: str, limit: int) -> tuple[str, bytes]:

@@ -23,6 +23,7 @@ _log = logging.getLogger(__name__)
 
 OnRequest = Callable[[str, str, str, float], object]  # service, job, arguments, time-out in seconds
 OnCancel = Callable[[str], None]
+OnRun = Callable[[str], None]
 
 PREFIX = "rapp_hop/"
 REQUEST = "rapp_msgs/HopRequest"
@@ -34,13 +35,14 @@ HANDSHAKE, PING, PONG = 5, 5, 5  # seconds
 class RosSide:
     """The link's services and topics on the robot's ROS graph; `open` has its undo in `close`."""
 
-    def __init__(self, url: str, services: Sequence[str], on_request: OnRequest, on_cancel: OnCancel) -> None:
+    def __init__(self, url: str, services: Sequence[str], on_request: OnRequest, on_cancel: OnCancel, on_run: OnRun) -> None:
         """Prepare; connects not yet.
 
         :param url: of the rosbridge, such as ws://127.0.0.1:9090
         :param services: names offered below rapp_hop/
         :param on_request: called in the loop; what it raises is the reason for the refusal
         :param on_cancel: called in the loop with a job's id
+        :param on_run: called in the loop with the name of a run that the core agent says lives
         :raises Invalid: not a WebSocket URL
         """
         if not url.startswith(("ws://", "wss://")):
@@ -48,7 +50,7 @@ class RosSide:
         self._url = url
         self._services = tuple(services)
         self._on_request = on_request
-        self._on_cancel = on_cancel
+        self._on_text = {"cancel": on_cancel, "runs": on_run}  # by topic
         self._held: deque[Event] = deque(maxlen=HELD)
         self._lock = threading.Lock()  # of `_connected` and `_held`
         self._connected = False
@@ -70,7 +72,8 @@ class RosSide:
         factory.setProtocolOptions(openHandshakeTimeout=HANDSHAKE, autoPingInterval=PING, autoPingTimeout=PONG)
         self._ros.on("ready", self._announce)
         self._ros.on("close", self._lost)
-        self._ros.on(f"{PREFIX}cancel", lambda message: self._hand_over(self._take_cancel, message))
+        for topic, take in self._on_text.items():
+            self._ros.on(f"{PREFIX}{topic}", lambda message, take=take: self._hand_over(take, str(message.get("data", ""))))
         for name in self._services:
             self._ros.on(f"{PREFIX}{name}", lambda message, name=name: self._hand_over(self._answer, name, message))
         factory.manager.run()
@@ -105,7 +108,8 @@ class RosSide:
         protocol._message_handlers["status"] = lambda message: _log.error("rosbridge says: %s", message.get("msg"))
         for topic, kind in (("events", "rapp_msgs/HopEvent"), ("alive", "std_msgs/String")):
             self._send({"op": "advertise", "topic": PREFIX + topic, "type": kind, "queue_size": 1000})
-        self._send({"op": "subscribe", "topic": f"{PREFIX}cancel", "type": "std_msgs/String", "queue_length": 100})
+        for topic in self._on_text:
+            self._send({"op": "subscribe", "topic": PREFIX + topic, "type": "std_msgs/String", "queue_length": 100})
         for name in self._services:
             self._send({"op": "advertise_service", "service": PREFIX + name, "type": REQUEST})
         with self._lock:
@@ -139,9 +143,6 @@ class RosSide:
             values = {"accepted": accepted, "message": reason}
             answer = {"op": "service_response", "service": PREFIX + name, "values": values, "result": True}
             self._send(answer | ({"id": message["id"]} if "id" in message else {}))
-
-    def _take_cancel(self, message: Any) -> None:
-        self._on_cancel(str(message.get("data", "")))
 
     def _publish(self, topic: str, fields: dict[str, Any]) -> None:
         self._send({"op": "publish", "topic": PREFIX + topic, "msg": fields})

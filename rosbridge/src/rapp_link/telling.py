@@ -15,8 +15,9 @@ from rapp_hop.streaming import Progress, Writer
 from rapp_link.letter import Outcome
 from rapp_link.smtp import Sender
 
-REPOSITORY, MAIL_SERVER = "repository", "mail-server"
-UNTOLD = frozenset({"heartbeat", "list_rapps"})  # asked again and again, whether something happens or not
+REPOSITORY, MAIL_SERVER, CLOUD_AGENT = "repository", "mail-server", "cloud-agent"
+UNTOLD = frozenset({"heartbeat", "list_rapps", "list_cloud_agents"})  # asked again and again, whether something happens or not
+_AGENT = re.compile(r"agents/[^/]+/(.+)")  # address of a cloud agent's service, which is nobody's business
 _HASH = re.compile(r"^[0-9a-f]{64}\.")  # before the name of a file of the store
 
 Tell = Callable[[str], None]
@@ -43,7 +44,9 @@ class TellingClient(HopClient):
         """See `HopClient`."""
         if service in UNTOLD:
             return await super().call(service, args, files, timeout)
-        return await self._told(service, super().call(service, args, files, timeout))
+        agent = _AGENT.fullmatch(service)
+        whom, what = (CLOUD_AGENT, agent[1]) if agent else (REPOSITORY, service)
+        return await self._told(whom, what, super().call(service, args, files, timeout))
 
     async def download(
         self,
@@ -55,18 +58,18 @@ class TellingClient(HopClient):
     ) -> int:
         """See `HopClient`."""
         name = _HASH.sub("", urlsplit(path).path.rpartition("/")[2])
-        count: int = await self._told(f"GET {name}", super().download(path, destination, limit, timeout, on_progress))
+        count: int = await self._told(REPOSITORY, f"GET {name}", super().download(path, destination, limit, timeout, on_progress))
         return count
 
-    async def _told(self, what: str, work: Any) -> Any:
-        self._tell(f"link->{REPOSITORY} {what}")
+    async def _told(self, whom: str, what: str, work: Any) -> Any:
+        self._tell(f"link->{whom} {what}")
         try:
             result = await work
         except HopError as error:
             answered = error.status is not None
-            self._tell(f"{REPOSITORY}->link reply {what}: {error.status}" if answered else f"link: no answer to {what}")
+            self._tell(f"{whom}->link reply {what}: {error.status}" if answered else f"link: no answer to {what}")
             raise
-        self._tell(f"{REPOSITORY}->link reply {what}")
+        self._tell(f"{whom}->link reply {what}")
         return result
 
 

@@ -31,6 +31,12 @@ def test_a_call_and_its_reply_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert told == ["link->repository profile", "repository->link reply profile"]
 
 
+def test_a_call_of_a_cloud_agent_is_told_without_its_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    client, told = answering(monkeypatch, {})
+    asyncio.run(client.call("agents/secret/check", {}))
+    assert told == ["link->cloud-agent check", "cloud-agent->link reply check"]
+
+
 def test_a_file_is_told_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
     client, told = answering(monkeypatch, 12)
     assert (
@@ -53,7 +59,7 @@ def test_an_answer_that_never_came_is_not_told_as_a_message(monkeypatch: pytest.
     assert told == ["link->repository profile", end]
 
 
-@pytest.mark.parametrize("service", ["heartbeat", "list_rapps"])
+@pytest.mark.parametrize("service", ["heartbeat", "list_rapps", "list_cloud_agents"])
 def test_what_is_asked_again_and_again_is_not_told(monkeypatch: pytest.MonkeyPatch, service: str) -> None:
     client, told = answering(monkeypatch, {})
     asyncio.run(client.call(service))
