@@ -1,0 +1,221 @@
+"""Who moves the robot is killed in the middle of each kind of motion: how long the robot goes on, by its own joints and clock.
+
+A RApp is killed, or stands still, or the core agent is killed. Times are simulated seconds, of a robot in real time; printed at the
+end beside the bounds of DESIGN section 3.1.
+"""
+
+import math
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from fakes.rapps import install_rapp
+from fakes.whole_robot import PATIENCE, WholeRobot, whole_robot
+from rapp_core.robot.naoqi.connection import Connection
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+
+SILENT = 1.0  # s without heartbeat after which a lease is silent
+STOPPED = 0.3  # s from then on within which motion has stopped
+GUARDED = 1.0  # s from the core agent's end to a still robot
+BUSY = 1.0  # s that a busy machine may add: three processes have to get their turns
+SETTINGS = f"""
+register_timeout = 0.5
+joint_speed = 0.02
+heartbeat = {SILENT}
+terminate = 0.5
+"""
+MOTIONS = ("move_to", "move_vel", "move_along_path", "move_joint", "take_predefined_posture", "look_at_point")
+PERMISSIONS = {"core": [f"rapp_{name}" for name in MOTIONS], "cloud": []}
+HEAD, ARM = "HeadYaw", "LShoulderPitch"
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What is true of the robot at one moment."""
+
+    time: float  # s simulated
+    soles: tuple[float, float]  # m
+    joints: dict[str, float]  # rad
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of motion: what the RApp calls, how far it is at a moment, and of that how much makes the middle."""
+
+    call: str
+    far: Callable[[Moment, Moment], float]  # from the first moment to another, m or rad; nothing but this motion adds to it
+    middle: float
+    noise: float  # m or rad
+
+
+def walked(first: Moment, now: Moment) -> float:
+    return math.dist(first.soles, now.soles)
+
+
+def turned(joint: str, sign: float) -> Callable[[Moment, Moment], float]:
+    return lambda first, now: sign * (now.joints[joint] - first.joints[joint])
+
+
+KINDS = {
+    "move_to": Kind("move_to(1.0, 0.0, 0.0)", walked, 0.08, 0.004),
+    "move_vel": Kind("move_vel(0.08, 0.0, 0.0)", walked, 0.08, 0.004),
+    "move_along_path": Kind("move_along_path([Pose(1.0, 0.0, 0.0, 'base_link')])", walked, 0.08, 0.004),
+    "move_joint": Kind(f"move_joint({HEAD!r}, 1.5, 0.02)", turned(HEAD, 1.0), 0.15, 0.005),
+    "posture": Kind("take_predefined_posture('StandZero', 0.1)", turned(ARM, -1.0), 0.3, 0.02),
+    "look_at": Kind("look_at_point(0.1, 1.0, 0.5)", turned(HEAD, 1.0), 0.15, 0.005),
+}
+BODY = """from rapp_api import Pose, navigation
+navigation.{call}
+while True:
+    self.pause(0.2)"""
+
+took: dict[str, tuple[float, float]] = {}
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WholeRobot]:
+    robot = WholeRobot(tmp_path_factory.mktemp("motion"), body=True)
+    robot.settings = SETTINGS
+    for name, kind in KINDS.items():
+        install_rapp(robot.home, name, BODY.format(call=kind.call), keywords=(name.replace("_", " "),), permissions=PERMISSIONS)
+    with whole_robot(robot, "roscore", "nao_sim", "core_agent"):
+        yield robot
+    print(f"\n{'who, and what it did':40}{'s until still':>15}{'bound':>8}")
+    for what, (seconds, bound) in took.items():
+        print(f"{what:40}{seconds:15.2f}{bound:8.1f}")
+
+
+class Watch:
+    """What was true of the robot, moment after moment."""
+
+    def __init__(self, robot: WholeRobot) -> None:
+        self.moments: list[Moment] = []
+        self._naoqi = Connection(robot.robot_url, 5.0)
+        self._enough = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._enough.wait(0.005):
+            self.moments.append(self.now())
+
+    def now(self) -> Moment:
+        call = self._naoqi.call
+        x, y, _theta = call("SimWorld", "getRobotPose")
+        angles = call("ALMotion", "getAngles", [HEAD, ARM], True)
+        return Moment(call("SimWorld", "getTime"), (x, y), dict(zip((HEAD, ARM), angles, strict=True)))
+
+    def until(self, condition: Callable[[Moment], bool]) -> Moment:
+        """Wait until something is true."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            now = self.moments[-1] if self.moments else self.now()
+            if condition(now):
+                return now
+            time.sleep(0.005)
+        raise AssertionError("the robot does not do what it was told to")
+
+    def went_on(self, kind: Kind, since: float) -> float:
+        """Seconds after a time that the motion went on: until it was as far as it ever came."""
+        first = self.moments[0]
+        later = [moment for moment in self.moments if moment.time >= since]
+        farthest = max(kind.far(first, moment) for moment in later)
+        arrived = next(moment for moment in later if kind.far(first, moment) >= farthest - kind.noise)
+        return arrived.time - since
+
+    def close(self) -> None:
+        self._enough.set()
+        self._thread.join(10)
+        self._naoqi.close()
+
+
+@contextmanager
+def watched(robot: WholeRobot) -> Iterator[Watch]:
+    watch = Watch(robot)
+    try:
+        yield watch
+    finally:
+        watch.close()
+
+
+def runner_of(robot: WholeRobot) -> int:
+    """The process of the dynamic agent, seen from outside of its sandbox; the next run's spare is not started before its end."""
+    (folder,) = (robot.home / "runs").iterdir()
+    below = {int((folder / "pid").read_text().split()[0])}
+    found = []
+    for stat in sorted(Path("/proc").glob("[0-9]*/stat"), key=lambda path: int(path.parent.name)):
+        try:
+            parent, words = int(stat.read_text().rpartition(")")[2].split()[1]), (stat.parent / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if parent in below:
+            below.add(int(stat.parent.name))
+            found += [int(stat.parent.name)] * words.endswith(b"rapp_api.runner\0")
+    return found[-1]
+
+
+def in_the_middle(robot: WholeRobot, watch: Watch, name: str) -> Moment:
+    """Have the RApp run, and wait until it has moved the robot half of the way."""
+    kind, since = KINDS[name], len(robot.seen)
+    first = watch.until(lambda _now: bool(watch.moments))
+    robot.ask(name.replace("_", " "))
+    robot.until(lambda seen: seen.state == "s9", since)
+    return watch.until(lambda now: kind.far(first, now) > kind.middle)
+
+
+def check(what: str, seconds: float, bound: float) -> None:
+    took[what] = seconds, bound
+    assert seconds <= bound + BUSY
+
+
+def until_resting(robot: WholeRobot) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while robot.naoqi.call("ALMotion", "robotIsWakeUp"):
+        assert time.monotonic() < deadline, f"the robot does not rest\n{robot.story()}"
+        time.sleep(0.1)
+    assert not robot.room("hasFallen")
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_rapp_killed_in_the_middle_of_a_motion_leaves_a_still_robot(robot: WholeRobot, name: str) -> None:
+    since = len(robot.seen)
+    with watched(robot) as watch:
+        killed = in_the_middle(robot, watch, name)
+        os.kill(runner_of(robot), signal.SIGKILL)
+        robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "It has crashed"), since)
+        until_resting(robot)
+    check(f"RApp killed, {name}", watch.went_on(KINDS[name], killed.time), STOPPED)
+    robot.until_only_the_spare_runs()
+
+
+def test_a_rapp_that_stands_still_in_a_walk_is_stopped(robot: WholeRobot) -> None:
+    since = len(robot.seen)
+    with watched(robot) as watch:
+        frozen = in_the_middle(robot, watch, "move_vel")
+        os.kill(runner_of(robot), signal.SIGSTOP)
+        robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "It does not answer any more"), since)
+        until_resting(robot)
+    check("RApp stands still, move_vel", watch.went_on(KINDS["move_vel"], frozen.time), SILENT + STOPPED)
+    robot.until_only_the_spare_runs()
+
+
+@pytest.mark.parametrize("name", ["move_to", "move_joint"])
+def test_a_core_agent_killed_in_the_middle_of_a_motion_leaves_a_still_robot(robot: WholeRobot, name: str) -> None:
+    with watched(robot) as watch:
+        killed = in_the_middle(robot, watch, name)
+        robot.kill("core_agent")
+        now = watch.until(lambda now: now.time > killed.time + GUARDED + BUSY)
+        watch.until(lambda later: later.time > now.time + 1.0)
+    check(f"core agent killed, {name}", watch.went_on(KINDS[name], killed.time), GUARDED)
+    assert not robot.room("hasFallen")
+    since = len(robot.seen)
+    robot.start("core_agent")
+    robot.until_listening(since)
