@@ -3,7 +3,7 @@
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from fakes.rapps import write_rapp
 from rapp_core.config import Config, Limits
 from rapp_core.launcher.launcher import Launcher
 from rapp_core.launcher.run import Run
+from rapp_core.ros.services import offered
 
 PATIENCE = 20.0  # s
 
@@ -37,16 +38,17 @@ class Workshop:
         ros = {name: ros_env[name] for name in ("ROS_MASTER_URI", "ROS_IP")}
         limits = Limits(memory=1 << 30, cpu=20, processes=40, files=64, file_size=1 << 20, private=4 << 20)
         self.config = Config(home=folder / "home", limits=limits, terminate=2.0)
-        self.launcher = Launcher(self.config, ros)
+        self.launcher = Launcher(self.config, ros, offered("/core_agent"))
         self.launcher.open()
         self.heard: list[dict[str, Any]] = []
         self._runs: list[Run] = []
         self._count = 0
 
-    def start(self, body: str) -> Run:
-        """Activate a RApp whose `execute` is `body`, and wait for its first word."""
+    def start(self, body: str, core: Sequence[str] = ("rapp_say",)) -> Run:
+        """Activate a RApp whose `execute` is `body`, which may use these core services, and wait for its first word."""
         self._count += 1
-        package = write_rapp(self.folder / f"package{self._count}", f"probe{self._count}", body)
+        permissions = {"core": list(core), "cloud": []}
+        package = write_rapp(self.folder / f"package{self._count}", f"probe{self._count}", body, permissions=permissions)
         run = self.launcher.activate(package, self.heard.append)
         self._runs.append(run)
         wait_for(lambda: run.first_word.is_set() or run.outcome is not None or not run.alive)
@@ -61,9 +63,10 @@ class Workshop:
         self._runs.remove(run)
         return log.read_text(), (run.outcome or ("", ""))[0]
 
-    def facts(self, body: str) -> Any:
+    def facts(self, body: str, core: Sequence[str] = ("rapp_say",)) -> Any:
         """What `body` puts into `facts`, found out from inside a sandbox."""
-        text, outcome = self.finish(self.start(f"import json\nfacts = None\n{body}\nprint('FACTS', json.dumps(facts), flush=True)"))
+        told = f"import json\nfacts = None\n{body}\nprint('FACTS', json.dumps(facts), flush=True)"
+        text, outcome = self.finish(self.start(told, core))
         assert outcome == "done", text
         return json.loads(next(line for line in text.splitlines() if line.startswith("FACTS "))[6:])
 

@@ -17,6 +17,7 @@ from rapp_core.launcher import orphans
 from rapp_core.launcher.channel import LONGEST, Channel
 from rapp_core.launcher.launcher import Launcher
 from rapp_core.launcher.run import Run
+from rapp_core.ros.services import offered
 
 FOREVER = "import time\nwhile True: time.sleep(0.05)"
 
@@ -155,15 +156,17 @@ from pathlib import Path
 from rapp_core.config import Config
 from rapp_core.launcher.launcher import Launcher
 from rapp_core.launcher.run import Run
-launcher = Launcher(Config(home=Path({str(tmp_path / "other")!r})), {workshop.launcher._ros!r})
+from rapp_core.ros.services import offered
+launcher = Launcher(Config(home=Path({str(tmp_path / "other")!r})), {workshop.launcher._ros!r}, offered("/core_agent"))
 launcher.open()
 launcher.prepare()
 assert launcher._spare.wait_ready(20)
-print(launcher._spare._process.first, launcher._spare._process.pid, flush=True)
+print(launcher._spare._process.first, launcher._spare._process.pid, launcher._spare._gate.pid, flush=True)
 time.sleep(60)
 """
     process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
     pids = [int(word) for word in process.stdout.readline().split()]
+    assert len(pids) == 3
     process.kill()
     process.wait()
     process.stdout.close()
@@ -196,7 +199,7 @@ def test_a_process_id_used_again_by_another_is_left_alone(tmp_path):
 
 def test_one_data_folder_has_one_core_agent(workshop):
     with pytest.raises(Refused, match="--home"):
-        Launcher(workshop.config, {}).open()
+        Launcher(workshop.config, {}, offered("/core_agent")).open()
 
 
 @pytest.mark.parametrize("broken", ["{", "[]", json.dumps({"name": "x"}), ""])

@@ -1,4 +1,4 @@
-"""Clients of the core agent's actions: actionlib's own, known to the core agent by the header of their connections."""
+"""Clients of the core agent's actions: actionlib's own, known to the core agent by a header that the gate fills in."""
 
 from collections.abc import Mapping
 from typing import Any

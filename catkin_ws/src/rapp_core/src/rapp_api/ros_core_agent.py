@@ -1,6 +1,7 @@
-"""The core agent over ROS: persistent connections to its services, which carry the run's secret in their header."""
+"""The core agent over ROS: persistent connections to its services."""
 
 import json
+import re
 import select
 import socket
 import threading
@@ -21,13 +22,17 @@ from rapp_api.ros_body import RosBody
 CONNECT_TIMEOUT = 5.0  # s for the service to appear at the ROS master
 ANSWER_TIMEOUT = 3600.0  # s; longer than any service takes: recording and listening end after 300 s
 PAUSE_STEP = 0.2  # s
+REFUSAL = re.compile(r"remote error reported: refused: (.*)", re.DOTALL)  # the gate's, as rospy puts it
 
 
 class RosCoreAgent(RosBody):
-    """See `core_agent.CoreAgent`. The secret came over this process's own channel: no other process can use it."""
+    """See `core_agent.CoreAgent`.
 
-    def __init__(self, token: str, answer_timeout: float = ANSWER_TIMEOUT) -> None:
-        self._header = {"rapp_channel": token}
+    A dynamic agent holds no secret: its gate knows who it is, and adds the lease's. Without a gate `token` is that secret.
+    """
+
+    def __init__(self, token: str = "", answer_timeout: float = ANSWER_TIMEOUT) -> None:
+        self._header = {"rapp_channel": token} if token else {}
         self._answer_timeout = answer_timeout
         self._idle: dict[str, list[Any]] = {}
         self._lock = threading.Lock()
@@ -93,7 +98,7 @@ class RosCoreAgent(RosBody):
         proxy = self._free(name)
         if proxy is None:
             rospy.wait_for_service(name, CONNECT_TIMEOUT)
-            proxy = rospy.ServiceProxy(name, cls, persistent=True, headers=self._header)
+            proxy = rospy.ServiceProxy(name, cls, persistent=True, headers=dict(self._header))
         bound = threading.Timer(self._answer_timeout, _break, [proxy])
         bound.daemon = True
         bound.start()
@@ -136,4 +141,7 @@ def _translated(name: str) -> Iterator[None]:
     except (TypeError, genpy.SerializationError, rospy.ROSSerializationException) as error:
         raise Invalid(f"cannot call {name}: {error}; give values of the types its description names") from error
     except (rospy.ServiceException, rospy.ROSException, ROSInternalException, OSError) as error:
+        refusal = REFUSAL.search(str(error))
+        if refusal is not None:
+            raise Refused(refusal[1]) from error
         raise Unreachable(f"cannot reach the core agent's service {name}: {error}; try again later") from error

@@ -1,6 +1,7 @@
 """The process of a dynamic agent: a warm spare at first, then the RApp it is told to be (`python -m rapp_api.runner`).
 
-Started by the core agent's launcher inside its sandbox, with one end of the channel as descriptor RAPP_CHANNEL_FD.
+Started by the core agent's launcher inside its sandbox, with one end of the channel as descriptor RAPP_CHANNEL_FD, and the way to
+its gate as RAPP_GATE_FD.
 """
 
 import logging
@@ -15,6 +16,7 @@ import rospy
 
 from rapp_api import core_agent
 from rapp_api.channel import SocketChannel
+from rapp_api.gate import hand_over_if_guarded
 from rapp_api.life import Bounds, live
 from rapp_api.ros_core_agent import RosCoreAgent
 
@@ -32,12 +34,13 @@ def main() -> None:
 
 def _run(end: socket.socket) -> None:
     channel = SocketChannel(end, _lost)
+    hand_over_if_guarded()
     rospy.init_node("dynamic_agent", anonymous=True, disable_signals=True, disable_rosout=True)
     logging.basicConfig(level=logging.INFO, format=LOG_FORMAT, stream=sys.stderr, force=True)  # rospy has put in its own
     channel.send(type="ready")
     order = channel.receive()
     if order is not None and order["type"] == "activate":
-        core_agent.use(RosCoreAgent(order["token"]))
+        core_agent.use(RosCoreAgent(order.get("token", "")))
         live(channel, order, _lost, Bounds())
     elif order is not None:
         channel.send(type="gone")

@@ -24,7 +24,7 @@ from rapp_core.robot.naoqi.guard import Guard
 from rapp_core.ros.actions import RosActions
 from rapp_core.ros.hop import RosHop
 from rapp_core.ros.node import join, leave, log_to_stderr
-from rapp_core.ros.services import RosServices
+from rapp_core.ros.services import RosServices, offered
 from rapp_core.ros.state import StatePublisher
 from rapp_core.ros.topics.offer import streams
 from rapp_core.services.context import Context
@@ -33,6 +33,8 @@ from rapp_core.services.keepsakes import Keepsakes
 from rapp_core.services.outside import Outside
 from rapp_core.trace import Trace
 from rapp_ros.rejoin import Rejoining
+
+NODE = "core_agent"
 
 _log = logging.getLogger(__name__)
 
@@ -45,13 +47,13 @@ def main() -> int:
         signal.signal(number, lambda *_: stop.set())
     try:
         config = read(sys.argv[1:])
-        launcher = Launcher(config, _ros_environment())
+        launcher = Launcher(config, _ros_environment(), offered(rospy.resolve_name(NODE)))
         launcher.open()
     except (CoreError, OSError) as error:
         _log.error("%s", error)
         return 2 if isinstance(error, Invalid) else 1
     try:
-        if join("core_agent", stop):
+        if join(NODE, stop):
             with Guard(config.robot, subscriber(config), config.home):
                 _run(config, launcher, stop)
         farewell = leave()

@@ -20,7 +20,7 @@ class _Timed(xmlrpc.client.Transport):
         return connection
 
 
-def ask(uri: str, timeout: float, question: str, *words: str) -> tuple[int, str, Any]:
+def ask(uri: str, timeout: float, question: str, *words: Any) -> tuple[int, str, Any]:
     """Call one method of the master at `uri`; gives status code, text and value. Waits up to `timeout` s.
 
     Raises MasterAwayError.

@@ -8,6 +8,7 @@ import select
 import signal
 import subprocess
 import time
+from collections.abc import Sequence
 
 from rapp_core.errors import Bug
 
@@ -25,8 +26,8 @@ def adopt_orphans() -> None:
 class Confined:
     """bubblewrap (our child) and the first process of its namespace, whose end is the end of all others in there."""
 
-    def __init__(self, words: list[str], channel: int, log: int) -> None:
-        """Start the sandbox with one descriptor passed in. Raises Bug.
+    def __init__(self, words: list[str], passed: Sequence[int], log: int) -> None:
+        """Start the sandbox with some descriptors passed in. Raises Bug.
 
         Call it from a thread that lives as long as this process: --die-with-parent means the starting thread.
         """
@@ -37,7 +38,7 @@ class Confined:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                pass_fds=(channel, tell),
+                pass_fds=(*passed, tell),
                 start_new_session=True,
                 env={"PATH": os.environ.get("PATH", os.defpath)},
             )

@@ -6,17 +6,24 @@ import os
 import secrets
 import shutil
 import socket
+from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 
 from rapp_core.config import Config
 from rapp_core.errors import Bug, CoreError, Refused, Unreachable
+from rapp_core.gate.rules import Offered, rules_for
 from rapp_core.launcher import orphans
 from rapp_core.launcher.channel import Channel
 from rapp_core.launcher.confined import Confined, adopt_orphans
+from rapp_core.launcher.gate import Gate
 from rapp_core.launcher.run import Run
 from rapp_core.launcher.sandbox import INSIDE_PRIVATE, RunFolders, command
 from rapp_core.manifest import Manifest, read_manifest
 from rapp_core.ports import Told
+
+INSIDE_MASTER = "http://127.0.0.1:11311"
+"""The ROS master that a dynamic agent sees: its gate."""
 
 _log = logging.getLogger(__name__)
 
@@ -27,9 +34,11 @@ class Launcher:
     All methods are for one thread that lives as long as the process (see `Confined`).
     """
 
-    def __init__(self, config: Config, ros: dict[str, str]) -> None:
+    def __init__(self, config: Config, ros: Mapping[str, str], offered: Offered) -> None:
+        """`ros`: environment of a node of the robot's ROS; `offered`: what RApps may be permitted to use there."""
         self._config = config
         self._ros = ros
+        self._offered = offered
         self._runs = config.home / "runs"
         self._spare: Run | None = None
         self._lock: int | None = None
@@ -64,7 +73,8 @@ class Launcher:
         run = self._take()
         try:
             _copy(package, run.folders.package)
-            run.activate(secrets.token_urlsafe(32), manifest, told)
+            rules = rules_for(manifest.core, self._offered, self._namespace)
+            run.activate(secrets.token_urlsafe(32), manifest, rules, told)
         except (OSError, shutil.Error, CoreError) as error:
             run.end(0.0)
             raise Unreachable(f"cannot start {manifest.name}: {error}") from error
@@ -76,7 +86,7 @@ class Launcher:
 
     def _take(self) -> Run:
         run, self._spare = self._spare, None
-        if run is not None and not run.alive:
+        if run is not None and not run.usable:
             _log.warning("the spare has died: %s", _tail(run))
             run.end(0.0)
             run = None
@@ -90,23 +100,36 @@ class Launcher:
     def _start(self) -> Run:
         folders = RunFolders(self._runs / secrets.token_hex(6), _account())
         folders.make()
-        ours, theirs = socket.socketpair()
-        theirs.setblocking(True)  # rospy sets a default time-out for new sockets, and the flag behind it would be inherited
-        try:
-            with folders.log.open("wb") as log, theirs:
-                words = command(folders, self._config.limits, self._environment(theirs.fileno()))
-                process = Confined(words, theirs.fileno(), log.fileno())
-        except Bug:
-            ours.close()
-            shutil.rmtree(folders.root, ignore_errors=True)
-            raise
+        with ExitStack() as undo:
+            undo.callback(shutil.rmtree, folders.root, ignore_errors=True)
+            ours, theirs = socket.socketpair()
+            undo.callback(ours.close)
+            theirs.setblocking(True)  # rospy sets a default time-out for new sockets, and the flag behind it would be inherited
+            gates, runners = socket.socketpair()
+            with theirs, gates, runners, folders.log.open("wb") as log:
+                gate = Gate(self._ros["ROS_MASTER_URI"], self._node(folders.root.name), gates)
+                undo.callback(gate.end)
+                passed = (theirs.fileno(), runners.fileno())
+                process = Confined(command(folders, self._config.limits, self._environment(*passed)), passed, log.fileno())
+            undo.pop_all()
         orphans.note(folders.root, process.pid)
-        return Run(folders.root.name, folders, process, Channel(ours))
+        return Run(folders.root.name, folders, process, Channel(ours), gate)
 
-    def _environment(self, channel: int) -> dict[str, str]:
+    @property
+    def _namespace(self) -> str:
+        return self._ros.get("ROS_NAMESPACE", "")
+
+    def _node(self, run: str) -> str:
+        """What a run is called in the robot's ROS, whatever it calls itself."""
+        return "/".join(["", *filter(None, self._namespace.split("/")), f"dynamic_agent_{run}"])
+
+    def _environment(self, channel: int, gate: int) -> dict[str, str]:
         return {
-            **self._ros,
+            **({"ROS_NAMESPACE": self._namespace} if self._namespace else {}),
+            "ROS_MASTER_URI": INSIDE_MASTER,
+            "ROS_IP": "127.0.0.1",
             "RAPP_CHANNEL_FD": str(channel),
+            "RAPP_GATE_FD": str(gate),
             "HOME": INSIDE_PRIVATE,
             "TMPDIR": INSIDE_PRIVATE,
             "ROS_HOME": INSIDE_PRIVATE,

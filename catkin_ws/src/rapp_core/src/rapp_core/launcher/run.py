@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from rapp_core.errors import Invalid, Unreachable
+from rapp_core.gate.rules import Rules
 from rapp_core.launcher.channel import Channel
 from rapp_core.launcher.confined import Confined
+from rapp_core.launcher.gate import Gate
 from rapp_core.launcher.sandbox import RunFolders
 from rapp_core.manifest import Manifest
 from rapp_core.ports import INSIDE_PACKAGE, Signal, Told
@@ -22,7 +24,7 @@ LEAVING = 1.0  # s for a dynamic agent that has said "gone" to leave ROS and end
 class Run:
     """A started process in its sandbox: first a warm spare, then, once activated, a dynamic agent. Used once."""
 
-    def __init__(self, name: str, folders: RunFolders, process: Confined, channel: Channel) -> None:
+    def __init__(self, name: str, folders: RunFolders, process: Confined, channel: Channel, gate: Gate) -> None:
         self.name = name
         self.token = ""  # secret of the lease, set at activation
         self.manifest: Manifest | None = None  # of the RApp, set at activation
@@ -31,12 +33,13 @@ class Run:
         self.first_word = threading.Event()
         self.gone = threading.Event()
         self.outcome: tuple[str, str] | None = None  # "done" or "failed", and why, once it has sent "terminate"
-        self.heartbeat = time.monotonic()  # when the last heartbeat came
+        self._beat_at = time.monotonic()  # when the last heartbeat came
         self.progress = time.monotonic()  # when its own loop last moved
         self.waits = False  # whether its own loop waits for a core service
         self._count = -1
         self._process = process
         self._channel = channel
+        self._gate = gate
         self._told: Told | None = None
         self._reader = threading.Thread(target=self._read, name=f"channel {name}", daemon=True)
         self._reader.start()
@@ -53,8 +56,18 @@ class Run:
 
     @property
     def alive(self) -> bool:
-        """Whether its process runs."""
-        return self._process.alive
+        """Whether its process and its gate run."""
+        return self._process.alive and self._gate.alive
+
+    @property
+    def usable(self) -> bool:
+        """Whether, as a spare, it can still become a dynamic agent."""
+        return self._process.alive and self._gate.answers
+
+    @property
+    def heartbeat(self) -> float:
+        """When the last sign of life of both came: without its gate a dynamic agent can do nothing."""
+        return min(self._beat_at, self._gate.beat)
 
     @property
     def status(self) -> int | None:
@@ -68,17 +81,20 @@ class Run:
             pass
         return self.ready.is_set() and self.alive
 
-    def activate(self, token: str, manifest: Manifest, told: Told) -> None:
-        """Turn the spare into the dynamic agent whose package lies in the package folder. Raises Unreachable."""
+    def activate(self, token: str, manifest: Manifest, rules: Rules, told: Told) -> None:
+        """Turn the spare into the dynamic agent whose package lies in the package folder. Raises Unreachable.
+
+        The lease's secret goes to the gate, never to the RApp.
+        """
         self.token = token
         self.manifest = manifest
         self._told = told
-        self.heartbeat = self.progress = time.monotonic()
+        self._gate.open(rules, token)
+        self._beat_at = self.progress = time.monotonic()
         told({"type": "activate"})  # before it is sent: what comes back is told by another thread
         self._channel.send(
             type="activate",
             run=self.name,
-            token=token,
             package=INSIDE_PACKAGE,
             entry=manifest.entry,
             parameters=manifest.parameters,
@@ -99,7 +115,10 @@ class Run:
         """End and reap all its processes: SIGTERM, after `patience` s SIGKILL; then remove its folders."""
         if self.gone.is_set():
             self._process.wait(LEAVING)
+        if not self._gate.answers:
+            self._gate.end()  # before the farewell to ROS that would wait for it
         self._process.end(patience)
+        self._gate.end()
         self._channel.close()
         self._reader.join(1)
         if keep_log is not None and self.folders.log.exists():
@@ -132,8 +151,8 @@ class Run:
             self.gone.set()
 
     def _beat(self, count: object, waits: object) -> None:
-        self.heartbeat = time.monotonic()
+        self._beat_at = time.monotonic()
         self.waits = waits is True
         if isinstance(count, int) and count > self._count:
             self._count = count
-            self.progress = self.heartbeat
+            self.progress = self._beat_at

@@ -1,8 +1,8 @@
 """The bubblewrap sandbox of a dynamic agent (DESIGN section 3.6): what it sees, and what it may use.
 
 It sees a read-only system, the Python environment, its own package, the recordings of its own run, and one private folder, which
-is of bounded size, in memory, and ends with it. It inherits one descriptor, its channel, and no environment. The network is the
-host's until the gate of DESIGN section 3.6.
+is of bounded size, in memory, and ends with it. It inherits two descriptors, its channel and the way to its gate, and no
+environment. Its network is its own, and has nothing but a loopback: see `rapp_core.gate`.
 """
 
 import importlib.util
@@ -56,7 +56,7 @@ def command(folders: RunFolders, limits: Limits, environment: dict[str, str]) ->
     read_only = [(path, path) for path in (*SYSTEM, *_python())]
     read_only += [(str(folders.package), INSIDE_PACKAGE), (recordings, recordings)]
     words = ["bwrap", "--die-with-parent", "--new-session"]
-    words += ["--unshare-ipc", "--unshare-pid", "--unshare-uts", "--unshare-cgroup-try"]
+    words += ["--unshare-ipc", "--unshare-net", "--unshare-pid", "--unshare-uts", "--unshare-cgroup-try"]
     words += ["--clearenv", "--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp"]
     for folder in _parents([inside for _, inside in read_only]):
         words += ["--perms", "0755", "--dir", folder]  # bubblewrap's own would be closed to other users

@@ -8,6 +8,7 @@ import rapp_msgs.srv
 import rospy
 
 from rapp_core.errors import CoreError, Refused
+from rapp_core.gate.rules import Offered
 from rapp_core.launcher.lease import Grant, Lease
 from rapp_core.ros.conversions import fields, fill
 from rapp_core.services.executor import Executor
@@ -76,6 +77,12 @@ class RosServices:
         path = self._keepsakes.keep(grant.run, request.name, request.data)
         self._trace.note(f"kept {path}")
         response.path = str(path)
+
+
+def offered(node: str) -> Offered:
+    """What gates may open to RApps; `node`: the core agent's."""
+    services = frozenset({row.name for row in CORE_SERVICES} | {"rapp_keep"})
+    return Offered(node, services, OUTSIDE, {row.name: row.srv for row in CORE_SERVICES if row.action})
 
 
 def allow(grant: Grant, name: str) -> None:
