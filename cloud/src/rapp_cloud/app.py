@@ -20,11 +20,11 @@ from rapp_cloud.services.presence import presence_services
 from rapp_cloud.services.runs import run_services
 from rapp_cloud.services.voice import voice_services
 from rapp_cloud.shelf import Shelf
-from rapp_cloud.static import FILE_PATTERN, StoreFiles
+from rapp_cloud.static import store_files
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
+from rapp_hop.registry import ServiceRegistry
 from rapp_hop.server import HopServer
-from rapp_hop.service import ServiceRegistry
 from rapp_hop.workers import Workers
 
 _log = logging.getLogger(__name__)
@@ -52,8 +52,8 @@ async def running_cloud(config: CloudConfig) -> AsyncIterator[int]:
     await asyncio.to_thread(_prepare, shelf, config)
     workers = Workers(load_interpreter, config.workers)
     server = HopServer(_registry(config, shelf, workers), Accounts(config.tokens).robot_of, config.data / "uploads", [
-        (rf"/tuf/metadata/{FILE_PATTERN}", StoreFiles, {"path": str(shelf.metadata)}),
-        (rf"/tuf/targets/{FILE_PATTERN}", StoreFiles, {"path": str(shelf.targets)}),
+        store_files("/tuf/metadata/", shelf.metadata),
+        store_files("/tuf/targets/", shelf.targets),
     ])  # fmt: skip
     refreshing = asyncio.create_task(_keep_fresh(shelf, config.refresh))
     try:

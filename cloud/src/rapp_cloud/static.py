@@ -1,22 +1,25 @@
 """The store's files over HTTP: `/tuf/metadata/<file>` and `/tuf/targets/<file>`, nothing above or below."""
 
-from tornado.web import StaticFileHandler, stream_request_body
+import asyncio
+import re
+from pathlib import Path
 
-from rapp_hop.server import JsonErrors
+from rapp_hop.errors import Refused
+from rapp_hop.mounts import Mount, Visit
+from rapp_hop.protocol import WireAnswer
+from rapp_hop.results import ANY_TYPE
 
-FILE_PATTERN = r"([0-9A-Za-z][0-9A-Za-z._-]{0,200})"  # no separator, no dot first
+_NAME = re.compile(r"[0-9A-Za-z][0-9A-Za-z._-]{0,200}", re.ASCII)  # no separator, no dot first
 
 
-@stream_request_body
-class StoreFiles(StaticFileHandler, JsonErrors):
-    """A folder's files, to be read only; who verifies asks for the newest, so nothing is cached."""
+def store_files(prefix: str, folder: Path) -> Mount:
+    """Serve a folder's files, to be read only and by everybody; who verifies asks for the newest, so nothing is cached."""
 
-    def data_received(self, chunk: bytes) -> None:
-        """Throw away a body that nobody asked for."""
+    async def send(visit: Visit) -> WireAnswer:
+        path = folder / visit.rest
+        if not _NAME.fullmatch(visit.rest) or not await asyncio.to_thread(path.is_file):
+            raise Refused("cannot find this file in the store: see /hop/list_rapps", 404)
+        kind = "application/json" if path.suffix == ".json" else ANY_TYPE
+        return WireAnswer(200, kind, path)
 
-    def compute_etag(self) -> None:
-        """Read no file twice for a tag."""
-
-    def should_return_304(self) -> bool:
-        """Send the file always."""
-        return False
+    return Mount(prefix, send, public=True, methods=frozenset({"GET", "HEAD"}))

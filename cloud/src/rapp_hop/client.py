@@ -135,11 +135,9 @@ class HopClient:
         return _result(url, response)
 
     def _connections(self, **bounds: int) -> SimpleAsyncHTTPClient:
-        client = SimpleAsyncHTTPClient(force_instance=True, **bounds)
         if self._socket_path is not None:
-            client.tcp_client.close()
-            client.tcp_client = _SocketClient(self._socket_path)
-        return client
+            return socket_connections(self._socket_path, **bounds)
+        return SimpleAsyncHTTPClient(force_instance=True, **bounds)
 
     async def _fetch(self, client: SimpleAsyncHTTPClient, request: HTTPRequest, timeout: float) -> HTTPResponse:
         if not (math.isfinite(timeout) and timeout > 0):
@@ -204,6 +202,14 @@ class HopClient:
             on_error(error)
         else:
             on_result(result)
+
+
+def socket_connections(path: Path, **bounds: int) -> SimpleAsyncHTTPClient:
+    """Return a client whose every connection goes to one UNIX socket."""
+    client = SimpleAsyncHTTPClient(force_instance=True, **bounds)
+    client.tcp_client.close()
+    client.tcp_client = _SocketClient(path)
+    return client
 
 
 class _SocketClient(TCPClient):

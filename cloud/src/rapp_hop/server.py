@@ -1,27 +1,36 @@
-"""The serving half of HOP: Tornado outside, `protocol`, `service` and `runner` inside.
+"""The serving half of HOP: connections outside, `forms`, `service` and `runner` inside.
 
-Before a byte of a body is taken the caller is known and the length is allowed. Answers to errors have a kind and a
-message; what went wrong inside is logged here and never sent.
+Before a byte of a body is taken the caller is known and the length is allowed. Errors are answered in the caller's form
+with a kind and a message; what went wrong inside is logged here and never sent.
 """
 
 import asyncio
+import base64
+import binascii
 import logging
-import secrets
-import tempfile
+import socket
+import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any
+from urllib.parse import urlsplit
 
-from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets, bind_unix_socket
-from tornado.web import Application, HTTPError, RequestHandler, stream_request_body
 
-from rapp_hop.errors import Bug, HopError, Invalid, Refused
-from rapp_hop.protocol import JSON_FORM, Call, Form, WireAnswer, WireRequest, form_of
+from rapp_hop.calls import MountJob, ServiceJob, note
+from rapp_hop.connection import Connection
+from rapp_hop.errors import HopError, Refused, Unreachable
+from rapp_hop.fairness import Brake, Fairness
+from rapp_hop.forms import OWN, form_of
+from rapp_hop.heads import Head, Job
+from rapp_hop.mounts import Mount
+from rapp_hop.page import load_pages
+from rapp_hop.protocol import Form, WireAnswer
+from rapp_hop.registry import ServiceRegistry
+from rapp_hop.repeats import Repeats
 from rapp_hop.runner import Runner
-from rapp_hop.service import Authenticate, Request, Service, ServiceRegistry
+from rapp_hop.service import BASE, Authenticate
+from rapp_hop.spool import Spool
 
 _log = logging.getLogger(__name__)
 
@@ -31,44 +40,55 @@ class ServerLimits:
     """Bounds of one server."""
 
     headers: int = 16 * 1024  # bytes
-    body: int = 64 * 2**20  # bytes, of the service with the largest
+    header_timeout: float = 20.0  # seconds to send the headers
     body_timeout: float = 60.0  # seconds to send a body
     idle_timeout: float = 60.0  # seconds between two requests of a connection
+    send_timeout: float = 60.0  # seconds in which a peer takes nothing of an answer
+    connections: int = 1000  # at once
+    connections_of_one: int = 300  # of one address
+    rate: float = 1000.0  # calls per second of one caller
+    burst: float = 2000.0  # calls of one caller at once
+    log_lines: int = 50  # per second
     drain: float = 1.0  # seconds for running calls when the server ends
 
 
 class HopServer:
-    """An HTTP server of HOP services and of other handlers beside them."""
+    """An HTTP server of HOP services, of the page on which to try them, and of mounts beside them."""
 
     def __init__(
         self,
         registry: ServiceRegistry,
         authenticate: Authenticate,
         uploads: Path,
-        others: Iterable[tuple[str, type[RequestHandler], dict[str, Any]]] = (),
+        mounts: Iterable[Mount] = (),
         limits: ServerLimits | None = None,
     ) -> None:
         """Prepare; opens no port yet. Needs a running loop.
 
-        :param authenticate: from the header `Accept-Token` to the caller, None for nobody
+        :param authenticate: from a token (`Accept-Token`, or `Authorization`) to the caller, None for nobody
         :param uploads: folder for files while a call runs
-        :param others: Tornado handlers for other URLs
         """
         self.limits = limits or ServerLimits()
-        self.runner = Runner(registry)
         self.registry = registry
-        self.authenticate = authenticate
+        self.runner = Runner()
+        self.repeats = Repeats(time.monotonic)
         self.uploads = uploads
-        self.busy = 0
-        routes = [(r"/hop/([^/?]+)/?", HopHandler, {"server": self}), *others, (r".*", LostHandler, {})]
-        application = Application(routes, log_function=_log_request)
-        self._http = HTTPServer(
-            application,
-            max_header_size=self.limits.headers,
-            max_body_size=self.limits.body,
-            body_timeout=self.limits.body_timeout,
-            idle_connection_timeout=self.limits.idle_timeout,
-        )
+        self.brake = Brake(self.limits.log_lines, time.monotonic)
+        self.header_bytes = self.limits.headers
+        self.header_timeout = self.limits.header_timeout
+        self.body_timeout = self.limits.body_timeout
+        self.idle_timeout = self.limits.idle_timeout
+        self.send_timeout = self.limits.send_timeout
+        self._authenticate = authenticate
+        self._mounts = tuple(mounts)
+        self._pages = load_pages()
+        self._fairness = Fairness(self.limits.rate, self.limits.burst, time.monotonic)
+        self._loop = asyncio.get_running_loop()
+        self._connections: set[Connection] = set()
+        self._of_address: dict[str, int] = {}
+        self._servers: list[asyncio.Task[asyncio.Server]] = []
+        self._sweeping = self._loop.create_task(self._sweep())
+        self._warming: asyncio.Task[None] | None = None
 
     def listen(self, port: int, address: str = "127.0.0.1") -> int:
         """Listen and return the port (an ephemeral one when 0 is given).
@@ -79,7 +99,8 @@ class HopServer:
             sockets = bind_sockets(port, address)
         except OSError as error:
             raise Refused(f"cannot listen on {address}:{port}: {error.strerror}, choose another port") from None
-        self._http.add_sockets(sockets)
+        for one in sockets:
+            self.listen_on(one)
         return int(sockets[0].getsockname()[1])
 
     def listen_unix(self, path: Path, mode: int = 0o600) -> None:
@@ -89,154 +110,140 @@ class HopServer:
         :raises Refused: when it cannot be had
         """
         try:
-            self._http.add_socket(bind_unix_socket(str(path), mode))
+            self.listen_on(bind_unix_socket(str(path), mode))
         except (OSError, ValueError) as error:
             raise Refused(f"cannot listen on {path}: {error}, choose another path") from None
 
+    def listen_on(self, listening: socket.socket) -> None:
+        """Serve on a socket that listens already; processes that share it share its callers."""
+        unix = listening.family == socket.AF_UNIX
+        create = self._loop.create_unix_server if unix else self._loop.create_server
+        self._servers.append(self._loop.create_task(create(lambda: Connection(self, self._loop), sock=listening)))
+        if self._warming is None:
+            self._warming = self._loop.create_task(self.runner.warm(self.registry))
+
     async def close(self) -> None:
         """Take no new connections, give running calls a moment, end."""
-        self._http.stop()
-        end = asyncio.get_running_loop().time() + self.limits.drain
-        while self.busy and asyncio.get_running_loop().time() < end:
+        for server in await asyncio.gather(*self._servers):
+            server.close()
+        end = self._loop.time() + self.limits.drain
+        while any(connection.busy for connection in self._connections) and self._loop.time() < end:
             await asyncio.sleep(0.02)
-        self.runner.close()
-        await self._http.close_all_connections()
+        self._sweeping.cancel()
+        for connection in list(self._connections):
+            connection.close()
+        await asyncio.gather(self._sweeping, *([self._warming] if self._warming else []), return_exceptions=True)
+        await self.runner.close()
 
+    # the connections' side, see `connection.Site`
 
-class JsonErrors(RequestHandler):
-    """Answers every error in our JSON form, without a stack trace."""
+    def opened(self, connection: Connection) -> HopError | None:
+        """Count a connection; turn it away when there are too many."""
+        self._connections.add(connection)
+        count = self._of_address[connection.address] = self._of_address.get(connection.address, 0) + 1
+        if len(self._connections) > self.limits.connections or (connection.address and count > self.limits.connections_of_one):
+            return Unreachable("cannot serve so many connections: try again later", 503)
+        return None
 
-    def set_default_headers(self) -> None:
-        """Name no software, let nobody guess types or keep answers."""
-        self.set_header("Server", "rapp")
-        self.set_header("X-Content-Type-Options", "nosniff")
-        self.set_header("Cache-Control", "no-store")
+    def closed(self, connection: Connection) -> None:
+        """Forget a connection."""
+        self._connections.discard(connection)
+        left = self._of_address.pop(connection.address, 1) - 1
+        if left > 0:
+            self._of_address[connection.address] = left
 
-    def write_error(self, status_code: int, **kwargs: Any) -> None:
-        """Write the error that Tornado caught."""
-        found = kwargs.get("exc_info", (None, None, None))[1]
-        self.send(JSON_FORM.write_error(_as_hop_error(found, status_code)))
+    def spool(self) -> Spool:
+        """Return a place for a body."""
+        return Spool(self.uploads)
 
-    def log_exception(
-        self,
-        typ: type[BaseException] | None,
-        value: BaseException | None,
-        tb: TracebackType | None,
-    ) -> None:
-        """Log what is our fault with its trace, the caller's in one line."""
-        if isinstance(value, HopError) and not isinstance(value, Bug):
-            _log.info("%s: %s", self.request.path[:100], value)
-        else:
-            super().log_exception(typ, value, tb)
+    def malformed(self, error: HopError) -> WireAnswer:
+        """Return the answer for what is no request."""
+        if self.brake.allows():
+            _log.info("%s", str(error)[:200])
+        return OWN.write_error(error, None)
 
-    def send(self, answer: WireAnswer) -> None:
-        """Finish with this answer."""
-        self.set_status(answer.status)
-        self.set_header("Content-Type", answer.content_type)
-        self.finish(answer.body)
-
-
-@stream_request_body
-class LostHandler(JsonErrors):
-    """Everything that is nowhere."""
-
-    def data_received(self, chunk: bytes) -> None:
-        """Throw the body away."""
-
-    def prepare(self) -> None:
-        """Say so."""
-        raise Refused("cannot find this page: see /hop/available_services", 404)
-
-
-@stream_request_body
-class HopHandler(JsonErrors):
-    """`/hop/<name>`."""
-
-    _service: Service
-    _caller: str
-    _form: Form
-
-    def initialize(self, server: HopServer) -> None:
-        """Take the server."""
-        self._server = server
-        self._body = bytearray()
-
-    def prepare(self) -> None:
-        """Know the caller, the service, and whether the body may come."""
-        caller = self._server.authenticate(self.request.headers.get("Accept-Token"))
-        if caller is None:
-            self._hang_up()
-            raise Refused("cannot serve this caller: send a valid Accept-Token", 401)
-        self._caller = caller
-        self._service = self._server.registry.get(self.path_args[0])
-        if self.request.method != "POST":
-            raise Refused("cannot call a service so: use POST", 405)
-        length = self.request.headers.get("Content-Length", "0")
-        if length.isdecimal() and int(length) > self._service.max_body:
-            self._hang_up()
-            raise self._too_large()
-        self._form = form_of(self._wire(b""))
-
-    def data_received(self, chunk: bytes) -> None:
-        """Collect the body within the service's bound."""
-        if self._finished:
-            return
-        self._body += chunk
-        if len(self._body) > self._service.max_body:
-            self._body.clear()
-            self._hang_up()
-            self.send(JSON_FORM.write_error(self._too_large()))
-
-    async def post(self, name: str) -> None:
-        """Read, check, run, answer."""
-        if self._finished:  # the body was too large
-            return
-        self._server.busy += 1
+    def begin(self, head: Head) -> Job | WireAnswer:
+        """Return who answers a request, or the answer."""
+        if head.path in self._pages and head.method in ("GET", "HEAD"):
+            return self._pages[head.path]
+        form: Form = OWN
+        wrong: HopError | None = None
         try:
-            call = self._form.read(self._wire(bytes(self._body)), self._service.name)
-            self._body.clear()
-            result = await self._run(call)
-            self.send(self._form.write(result))
-        finally:
-            self._server.busy -= 1
+            form = form_of(head.method, head.headers, head.query)
+        except HopError as error:
+            wrong = error
+        try:
+            return self._begin(head, form, wrong)
+        except HopError as error:
+            note(self.brake, head, error)
+            return form.write_error(error, None)
 
-    async def _run(self, call: Call) -> Any:
-        request = Request(self._caller, self._service.name, _headers(self.request.headers), self.request.remote_ip or "")
-        if not call.uploads:
-            return await self._server.runner.run(self._service, self._service.bind(call.arguments, {}, request))
-        self._server.uploads.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with tempfile.TemporaryDirectory(dir=self._server.uploads) as folder:
-            files = {upload.parameter: Path(folder, secrets.token_hex(8) + upload.suffix) for upload in call.uploads}
-            arguments = self._service.bind(call.arguments, files, request)
-            for upload in call.uploads:
-                await asyncio.to_thread(files[upload.parameter].write_bytes, upload.data)
-            return await self._server.runner.run(self._service, arguments)
+    def _begin(self, head: Head, form: Form, wrong: HopError | None) -> Job | WireAnswer:
+        mount = next((one for one in self._mounts if head.path.startswith(one.prefix)), None)
+        if mount is not None and mount.public:
+            return self._mounted(head, "", mount, form)
+        if mount is None and not head.path.startswith(BASE):
+            raise Refused("cannot find this page: see /hop/available_services", 404)
+        _check_origin(head.headers)
+        caller = self._authenticate(token_of(head.headers))
+        if caller is None:
+            raise Refused("cannot serve this caller: send a valid Accept-Token", 401)
+        self._fairness.admit(caller)
+        if mount is not None:
+            return self._mounted(head, caller, mount, form)
+        item = self.registry.at(head.path)
+        if wrong is not None:
+            raise wrong
+        if head.method == "HEAD":
+            return WireAnswer(200, "text/plain", b"")
+        return ServiceJob(self, head, caller, item, form)
 
-    def _wire(self, body: bytes) -> WireRequest:
-        return WireRequest(self.request.method or "", self.request.path, _headers(self.request.headers), body)
+    def _mounted(self, head: Head, caller: str, mount: Mount, form: Form) -> Job:
+        if head.method not in mount.methods:
+            raise Refused(f"cannot serve {head.method} here", 405)
+        return MountJob(self.brake, head, caller, mount, form)
 
-    def _too_large(self) -> Refused:
-        return Refused(f"cannot take more than {self._service.max_body} bytes for {self._service.name}", 413)
-
-    def _hang_up(self) -> None:
-        self.set_header("Connection", "close")
-
-
-def _headers(headers: Mapping[str, str]) -> dict[str, str]:
-    return {name.lower(): value for name, value in headers.items()}
-
-
-def _as_hop_error(found: BaseException | None, status: int) -> HopError:
-    if isinstance(found, HopError):
-        return found
-    if isinstance(found, HTTPError) and found.status_code < 500:
-        return Refused(f"cannot serve this request: HTTP {found.status_code}", found.status_code)
-    if status < 500:
-        return Invalid(f"cannot serve this request: HTTP {status}", status)
-    return Bug("cannot finish the call: the platform has a fault of its own, which is in its log")
+    async def _sweep(self) -> None:
+        bounds = (self.header_timeout, self.body_timeout, self.idle_timeout, self.send_timeout)
+        period = min(max(min(bounds) / 4, 0.02), 1.0)
+        while True:
+            await asyncio.sleep(period)
+            now = self._loop.time()
+            for connection in list(self._connections):
+                if connection.deadline is not None and now > connection.deadline:
+                    connection.overdue()
 
 
-def _log_request(handler: RequestHandler) -> None:
-    request = handler.request
-    took = 1000 * request.request_time()
-    _log.info("%s %s %s %.1f ms", handler.get_status(), request.method, request.path[:100], took)
+def token_of(headers: Mapping[str, str]) -> str | None:
+    """Return the token of a request: `Accept-Token`, or `Authorization` (Bearer, or Basic with it as password).
+
+    :raises Refused: with status 401, when there are two that differ
+    """
+    own = headers.get("accept-token")
+    authorization = headers.get("authorization")
+    if authorization is None:
+        return own
+    other = _authorized(authorization)
+    if own is not None and own != other:
+        raise Refused("cannot tell who calls: Accept-Token and Authorization differ", 401)
+    return other
+
+
+def _authorized(value: str) -> str | None:
+    scheme, _, rest = value.partition(" ")
+    if scheme.lower() == "bearer":
+        return rest.strip()
+    if scheme.lower() != "basic":
+        return None
+    try:
+        return base64.b64decode(rest.strip(), validate=True).decode("utf-8").partition(":")[2]
+    except (binascii.Error, UnicodeDecodeError):
+        return None
+
+
+def _check_origin(headers: Mapping[str, str]) -> None:
+    """A browser on somebody else's page must not call in the name of its user (input H20)."""
+    origin = headers.get("origin")
+    foreign = origin is not None and urlsplit(origin).netloc.lower() != headers.get("host", "").lower()
+    if foreign or headers.get("sec-fetch-site") in ("cross-site", "same-site"):
+        raise Refused("cannot serve another site's page: open the platform's own", 403)

@@ -11,6 +11,7 @@ from typing import Any
 from rapp_hop.errors import Invalid
 
 MAX_DEPTH = 32  # containers inside containers
+_ENCODER = json.JSONEncoder(allow_nan=False, ensure_ascii=False)
 
 
 def loads(data: bytes | str, *, limit: int, depth: int = MAX_DEPTH) -> Any:
@@ -40,7 +41,7 @@ def dumps(value: Any) -> str:
     :raises Invalid: when it holds something JSON has not (NaN, bytes, objects, cycles)
     """
     try:
-        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+        return _ENCODER.encode(value)
     except (TypeError, ValueError, RecursionError) as error:
         raise Invalid(f"cannot write as JSON: {error}") from None
 

@@ -5,6 +5,7 @@ First comes (import path, module, function): the function makes the object. Then
 """
 
 import importlib
+import pickle
 import signal
 import sys
 from multiprocessing.connection import Connection
@@ -24,9 +25,16 @@ def main() -> None:
                 answer = (True, getattr(subject, method)(*arguments))
             except Exception as error:  # noqa: BLE001 (carried to the caller, who knows its type)
                 answer = (False, error)
-            pipe.send(answer)
+            _send(pipe, answer)
     except (EOFError, ConnectionError):
         return
+
+
+def _send(pipe: Connection, answer: tuple[bool, object]) -> None:
+    try:
+        pipe.send(answer)
+    except (pickle.PicklingError, TypeError, AttributeError) as error:
+        pipe.send((False, TypeError(f"cannot pass on the worker's answer: {error}")))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 """Worker processes for CPU-heavy work: each holds one object made by `setup` and runs its methods, one call at a time.
+They are started all at once, or one after another as they are needed.
 
 A call has a deadline; a worker that overruns it or dies is killed, reaped and replaced. Arguments and results are
 pickled. A worker ends by itself when the parent is gone. (Not `multiprocessing`: its resource tracker is a process
@@ -11,6 +12,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -20,22 +22,27 @@ _log = logging.getLogger(__name__)
 
 
 class Workers:
-    """A fixed number of worker processes; start with `start()`, end with `close()`."""
+    """Worker processes; start with `start()`, end with `close()`."""
 
-    def __init__(self, setup: Callable[[], object], count: int) -> None:
+    def __init__(self, setup: Callable[[], object], count: int, first: int | None = None) -> None:
         """Remember what to start.
 
         :param setup: a function of an importable module that makes the object whose methods are called
+        :param count: processes at most
+        :param first: how many of them start at once, all when None; the others when no free one is left
         """
         self._setup = setup
         self._count = count
+        self._first = count if first is None else min(first, count)
+        self._starting: set[asyncio.Task[None]] = set()
+        self._threads = ThreadPoolExecutor(count, thread_name_prefix="worker-pipe")  # each waits for one worker's answer
         self._free: asyncio.Queue[_Worker] = asyncio.Queue()
         self._all: set[_Worker] = set()
         self._closed = False
 
     async def start(self) -> None:
         """Start the processes; they set up in the background, so this returns at once."""
-        for _ in range(self._count):
+        for _ in range(self._first):
             await self._add()
 
     async def run(self, method: str, *arguments: Any, timeout: float) -> Any:
@@ -47,6 +54,8 @@ class Workers:
         """
         try:
             async with asyncio.timeout(timeout):
+                if self._free.empty() and len(self._all) + len(self._starting) < self._count:
+                    await self._add()
                 worker = await self._free.get()
                 return await self._use(worker, method, arguments)
         except TimeoutError:
@@ -55,12 +64,14 @@ class Workers:
     async def close(self) -> None:
         """End and reap all workers."""
         self._closed = True
+        await asyncio.gather(*self._starting, return_exceptions=True)
         await asyncio.gather(*(asyncio.to_thread(worker.end) for worker in list(self._all)))
         self._all.clear()
+        self._threads.shutdown(wait=False)
 
     async def _use(self, worker: "_Worker", method: str, arguments: tuple[Any, ...]) -> Any:
         answered = False
-        call = asyncio.ensure_future(asyncio.to_thread(worker.call, method, arguments))
+        call = asyncio.get_running_loop().run_in_executor(self._threads, worker.call, method, arguments)
         try:
             good, value = await asyncio.shield(call)
             answered = True
@@ -86,6 +97,13 @@ class Workers:
             await self._add()
 
     async def _add(self) -> None:
+        # A task of its own: who waits for it may be cancelled, the process that was begun must be known all the same.
+        task = asyncio.get_running_loop().create_task(self._begin())
+        self._starting.add(task)
+        task.add_done_callback(self._starting.discard)
+        await asyncio.shield(task)
+
+    async def _begin(self) -> None:
         worker = await asyncio.to_thread(_Worker, self._setup)
         self._all.add(worker)
         self._free.put_nowait(worker)

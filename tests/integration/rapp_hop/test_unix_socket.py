@@ -7,8 +7,9 @@ import pytest
 
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Refused, Unreachable
+from rapp_hop.registry import ServiceRegistry
 from rapp_hop.server import HopServer
-from rapp_hop.service import Request, ServiceRegistry, service
+from rapp_hop.service import Request, service
 
 
 @service

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from rapp_hop.errors import Invalid, Refused
-from rapp_hop.service import Request, Service, ServiceRegistry, service
+from rapp_hop.registry import ServiceRegistry
+from rapp_hop.service import Request, Service, service
 
 REQUEST = Request("nao", "x", {}, "127.0.0.1")
 
@@ -87,7 +88,7 @@ def test_describe() -> None:
 
 def test_registry() -> None:
     registry = ServiceRegistry([mix])
-    assert [item.name for item in registry] == ["available_services", "mix"]
+    assert [item.name for item in registry] == ["available_services", "mix", "openapi"]
     with pytest.raises(ValueError, match="taken"):
         registry.add(mix)
     with pytest.raises(Refused) as caught:

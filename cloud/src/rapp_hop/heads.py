@@ -1,0 +1,52 @@
+"""What the parts of the server hand to each other: a request's head, and the job that answers it, and how far both have come."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from rapp_hop.errors import HopError
+from rapp_hop.protocol import Body, WireAnswer, WireRequest
+from rapp_hop.spool import Spool
+
+
+@dataclass(slots=True)
+class Head:
+    """A request before its body."""
+
+    method: str
+    path: str
+    query: str
+    headers: dict[str, str]  # names in lower case
+    address: str  # of the peer
+
+    def with_body(self, body: Body) -> WireRequest:
+        """Return the whole request."""
+        return WireRequest(self.method, self.path, self.headers, body, self.query)
+
+
+class Job(Protocol):
+    """Answers one request."""
+
+    max_body: int  # bytes
+
+    async def run(self, body: Body) -> WireAnswer:
+        """Answer; an error is an answer too."""
+
+    def failed(self, error: HopError) -> WireAnswer:
+        """Return the answer for an error that came before the body was whole."""
+
+    async def done(self) -> None:
+        """Clean up; the answer has been sent, or could not be."""
+
+
+class Exchange:
+    """One request and what becomes of it."""
+
+    __slots__ = ("answer", "body", "head", "job", "keep", "version")
+
+    def __init__(self, head: Head | None, keep: bool, version: str) -> None:
+        self.head = head
+        self.keep = keep
+        self.version = version
+        self.job: Job | None = None
+        self.answer: WireAnswer | None = None
+        self.body: Spool | None = None
