@@ -27,6 +27,9 @@ echo = rospy.Publisher("~out", String, queue_size=100)
 rospy.Subscriber("~in", String, echo.publish)
 
 def count(goal):
+    topics = (counter.action_server.feedback_pub, counter.action_server.result_pub)
+    while not all(topic.get_num_connections() for topic in topics):  # actionlib does not wait for who is still connecting
+        rospy.sleep(0.01)
     number = 0
     while number < goal.goal and not counter.is_preempt_requested():
         number += 1
