@@ -8,7 +8,10 @@ from rapp_core.errors import CoreError, Refused, Unreachable
 
 
 class FakeLink:
-    """Implements `ports.Hop`: packages lie in `shelf` by name; `away` makes it unreachable; `errors` fail one service."""
+    """Implements `ports.Hop`: packages lie in `shelf` by name; `away` makes it unreachable; `errors` fail one service.
+
+    `answers` has results of services by name, or functions of the arguments; `kept` the runs that were said to live.
+    """
 
     def __init__(self, shelf: Mapping[str, Path] | None = None, catalogue: list[dict[str, Any]] | None = None) -> None:
         self.shelf = dict(shelf or {})
@@ -17,6 +20,7 @@ class FakeLink:
         self.errors: dict[str, CoreError] = {}
         self.answers: dict[str, Any] = {}
         self.asked: list[tuple[str, dict[str, Any]]] = []
+        self.kept: list[str] = []
 
     @property
     def present(self) -> bool:
@@ -25,6 +29,9 @@ class FakeLink:
     def names(self) -> list[str]:
         return [name for name, _ in self.asked]
 
+    def keep(self, run: str) -> None:
+        self.kept.append(run)
+
     def request(self, name: str, arguments: Mapping[str, Any], timeout: float) -> Any:
         self.asked.append((name, dict(arguments)))
         if self.away:
@@ -32,7 +39,8 @@ class FakeLink:
         if name in self.errors:
             raise self.errors[name]
         if name in self.answers:
-            return self.answers[name]
+            answer = self.answers[name]
+            return answer(arguments) if callable(answer) else answer
         if name == "install":
             return self._install(arguments["name"])
         return {"register": {"registered": True, "lease": 30}, "list_rapps": {"rapps": self.catalogue}}[name]

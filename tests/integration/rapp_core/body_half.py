@@ -12,6 +12,7 @@ from fakes.agents import FakeAgent, Script
 from fakes.clock import Clock
 from fakes.rapps import write_rapp
 from rapp_core.config import Config
+from rapp_core.control.cloud_agent import CloudAgents
 from rapp_core.launcher.lease import Lease
 from rapp_core.manifest import read_manifest
 from rapp_core.robot.naoqi import robot
@@ -35,8 +36,8 @@ def main(url: str, token: str, folder: Path) -> None:
     connection = Connection(url, config.naoqi_timeout)
     join("body_half", stop)
     context = Context(robot(connection, config), config, trace, folder)
-    executor = Executor(context)
-    RosServices(executor, Outside(RosHop(stop, trace), config, stop), Keepsakes(config), lease, trace)
+    executor, hop = Executor(context), RosHop(stop, trace)
+    RosServices(executor, Outside(hop, CloudAgents(hop, config), config, stop), Keepsakes(config), lease, trace)
     RosActions(executor, lease, trace)
     permissions = {"core": [row.name for row in CORE_SERVICES], "cloud": []}
     package = write_rapp(folder / "run" / "package", "mover", permissions=permissions)

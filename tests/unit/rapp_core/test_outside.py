@@ -1,6 +1,8 @@
 """Calls of a dynamic agent that leave the robot: only those its package.json names, only its own recordings."""
 
+import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -8,10 +10,12 @@ from fakes.agents import FakeAgent, Script
 from fakes.clock import Clock
 from fakes.link import FakeLink
 from fakes.rapps import write_rapp
-from rapp_core.config import Config
+from rapp_core.config import Config, Limits
+from rapp_core.control.cloud_agent import CloudAgents
 from rapp_core.errors import Invalid, Refused, Unreachable
 from rapp_core.manifest import read_manifest
-from rapp_core.services.outside import Outside
+from rapp_core.services.outside import CloudCall, Outside
+from rapp_core.services.sendable import CallFile
 
 
 @pytest.fixture
@@ -35,26 +39,27 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def outside(link: FakeLink, clock: Clock) -> Outside:
-    return Outside(link, Config(name="nao7"), clock.event(), clock.now)
+def outside(link: FakeLink, clock: Clock, tmp_path: Path) -> Outside:
+    config = Config(name="nao7", home=tmp_path / "home")
+    return Outside(link, CloudAgents(link, config), config, clock.event(), clock.now)
 
 
 def test_a_permitted_call_is_passed_on_and_answered(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
-    assert outside.cloud_call(agent, "profile", '{"robot": "nao7"}', 2.0) == '{"name": "Maria"}'
+    assert outside.cloud_call(agent, CloudCall("profile", '{"robot": "nao7"}', 2.0)) == '{"name": "Maria"}'
     assert link.asked == [("call", {"service": "profile", "arguments": {"robot": "nao7"}})]
 
 
 @pytest.mark.parametrize("service", ["report", "Profile", ""])
 def test_a_call_that_the_package_does_not_name_is_refused(outside: Outside, agent: FakeAgent, link: FakeLink, service: str) -> None:
     with pytest.raises(Refused, match=r"permissions\.cloud"):
-        outside.cloud_call(agent, service, "{}", 0.0)
+        outside.cloud_call(agent, CloudCall(service, "{}"))
     assert link.asked == []
 
 
 @pytest.mark.parametrize("arguments", ["{", "[1]", '"text"'])
 def test_arguments_that_are_no_object_are_invalid(outside: Outside, agent: FakeAgent, arguments: str) -> None:
     with pytest.raises(Invalid):
-        outside.cloud_call(agent, "profile", arguments, 0.0)
+        outside.cloud_call(agent, CloudCall("profile", arguments))
 
 
 def test_a_mail_is_handed_to_the_link(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
@@ -111,3 +116,59 @@ def test_a_mail_that_is_refused_is_not_tried_again(outside: Outside, agent: Fake
     with pytest.raises(Refused):
         outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
     assert link.names() == ["send_mail"]
+
+
+def sent(link: FakeLink) -> list[dict[str, Any]]:
+    return [arguments["arguments"] for name, arguments in link.asked if name == "call"]
+
+
+def test_a_recording_or_a_kept_file_may_be_sent(outside: Outside, agent: FakeAgent, link: FakeLink, tmp_path: Path) -> None:
+    for path in (agent.recordings / "recording-1.ogg", tmp_path / "home" / "keepsakes" / "mailer" / "table.jpg"):
+        outside.cloud_call(agent, CloudCall("profile", json.dumps({"recording": {"file": str(path)}})))
+        assert sent(link)[-1] == {"recording": {"file": str(path)}}
+
+
+def test_no_other_file_leaves_the_robot(outside: Outside, agent: FakeAgent, link: FakeLink, tmp_path: Path) -> None:
+    secret = tmp_path / "secret.ogg"
+    secret.write_bytes(b"OggS")
+    (agent.recordings / "link.ogg").symlink_to(secret)
+    others = tmp_path / "home" / "keepsakes" / "other" / "table.jpg"
+    for path in (secret, agent.recordings / "link.ogg", agent.recordings / ".." / ".." / "secret.ogg", others, "recording.ogg", 3):
+        with pytest.raises(Refused, match="may leave the robot"):
+            outside.cloud_call(agent, CloudCall("profile", json.dumps({"recording": {"file": str(path)}})))
+    assert link.asked == []
+
+
+def test_files_handed_over_lie_on_the_disk_while_the_call_runs(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
+    seen: list[bytes] = []
+
+    def look(arguments: dict[str, Any]) -> str:
+        path = Path(arguments["arguments"]["picture"]["file"])
+        seen.append(path.read_bytes())
+        assert path.parent == agent.recordings and path.suffix == ".jpg"
+        return "ok"
+
+    link.answers["call"] = look
+    assert outside.cloud_call(agent, CloudCall("profile", "{}", files=[CallFile("picture", "a/../b.JPG", b"JPEG")])) == '"ok"'
+    assert seen == [b"JPEG"]
+    assert list(agent.recordings.iterdir()) == []
+    link.errors["call"] = Unreachable("cannot reach it")
+    with pytest.raises(Unreachable):
+        outside.cloud_call(agent, CloudCall("profile", "{}", files=[CallFile("picture", "b.jpg", b"JPEG")]))
+    assert list(agent.recordings.iterdir()) == []
+
+
+def test_files_are_bounded(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
+    half = bytes(Limits().sent // 2 + 1)
+    with pytest.raises(Refused, match="bytes with a call"):
+        outside.cloud_call(agent, CloudCall("profile", "{}", files=[CallFile("a", "a", half), CallFile("b", "b", half)]))
+    with pytest.raises(Invalid, match="twice"):
+        outside.cloud_call(agent, CloudCall("profile", "{}", files=[CallFile("a", "a", b""), CallFile("a", "b", b"")]))
+    assert link.asked == []
+
+
+def test_without_a_partner_there_is_no_cloud_agent_to_call(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
+    with pytest.raises(Refused, match="names no partner"):
+        outside.cloud_call(agent, CloudCall("check", "{}", agent=True))
+    assert not outside.stop_cloud_agent(agent)
+    assert link.asked == []

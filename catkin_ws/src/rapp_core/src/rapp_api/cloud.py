@@ -1,4 +1,7 @@
-"""Calls that leave the robot: HOP services of the repository agent, and mail (deliverable section 4.2, paper Fig. 12).
+"""Calls that leave the robot: HOP services of repository and cloud agent, and mail (deliverable sections 3, 4.2, paper Fig. 12).
+
+Three agents: `call` reaches the repository agent's services that package.json names. Four agents: `call_agent` reaches those of the
+RApp's own cloud agent, which calls the repository agent's. A `pathlib.Path` among the arguments is sent as a file.
 
 Each comes in two forms: the plain one returns at once, and calls back later from a thread of its own; `..._wait` waits.
 """
@@ -21,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 def call_wait(service: str, args: dict[str, Any] | None = None, timeout: float = 0.0) -> Any:
     """Call a HOP service and wait for its JSON result, at most `timeout` s (0: the core agent's own). Raises RappError."""
-    return current().cloud_call(service, args or {}, timeout)
+    return current().cloud_call(service, args or {}, timeout, False)
 
 
 def call(
@@ -33,6 +36,30 @@ def call(
 ) -> None:
     """Call a HOP service asynchronously; one of the callbacks is called, once. Raises Refused when too many calls are open."""
     _later(f"call {service}", lambda: call_wait(service, args, timeout), on_result, on_error)
+
+
+def call_agent_wait(service: str, args: dict[str, Any] | None = None, timeout: float = 0.0) -> Any:
+    """As `call_wait`, of this RApp's cloud agent. Raises Refused too when that has ended, Unreachable when it dies meanwhile."""
+    return current().cloud_call(service, args or {}, timeout, True)
+
+
+def call_agent(
+    service: str,
+    args: dict[str, Any] | None = None,
+    on_result: OnResult | None = None,
+    on_error: OnError | None = None,
+    timeout: float = 0.0,
+) -> None:
+    """As `call`, of this RApp's cloud agent."""
+    _later(f"call {service}", lambda: call_agent_wait(service, args, timeout), on_result, on_error)
+
+
+def stop_agent_wait() -> bool:
+    """Kill this RApp's cloud agent (deliverable section 3.2); whether there was one. Raises RappError.
+
+    Called by itself when the RApp is dismantled; a RApp that needs it no more may do it before.
+    """
+    return current().stop_cloud_agent()
 
 
 def send_mail_wait(recipients: Sequence[str], subject: str, body: str, attachment: str = "") -> str:

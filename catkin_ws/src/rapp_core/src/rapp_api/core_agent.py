@@ -72,8 +72,14 @@ class CoreAgent(Protocol):
     def action_client(self, name: str) -> Any:
         """A client of the action of that name, as actionlib.SimpleActionClient."""
 
-    def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float) -> Any:
-        """Call a HOP service of the repository agent; gives its JSON result."""
+    def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float, agent: bool) -> Any:
+        """Call a HOP service of the repository agent, or of this RApp's cloud agent; gives its JSON result.
+
+        A `Path` among the arguments is sent as a file.
+        """
+
+    def stop_cloud_agent(self) -> bool:
+        """Have this RApp's cloud agent stopped; whether there was one."""
 
     def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
         """Send a mail; gives "delivered", "kept" or "locked" (see `rapp_api.cloud.send_mail_wait`)."""

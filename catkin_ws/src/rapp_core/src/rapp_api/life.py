@@ -9,9 +9,11 @@ from typing import Any
 
 from rapp_agent import Event
 from rapp_api.channel import Channel
+from rapp_api.cloud import stop_agent_wait
 from rapp_api.core_agent import activity
 from rapp_api.dynamic_agent import DynamicAgent
 from rapp_api.entry import load
+from rapp_api.errors import RappError
 
 LONGEST_DETAIL = 500  # characters; the core agent ends who sends too long a line
 
@@ -49,8 +51,8 @@ def live(channel: Channel, order: dict[str, Any], lost: Callable[[], None], boun
         threading.Thread(target=work, name=work.__name__, daemon=True).start()
     agent = _be(channel, order)
     asked = dismantle.wait(bounds.dismantle)
-    if agent is not None and asked:
-        _dismantle(agent)
+    if asked:
+        _dismantle(agent, has_cloud_agent=bool(order.get("cloud_agent")))
     gone.set()
     channel.send(type="gone")
 
@@ -81,8 +83,15 @@ def _tell(channel: Channel, event: Event) -> None:
     channel.send(type="state", machine=event.machine, state=event.state, kind=event.kind, detail=detail)
 
 
-def _dismantle(agent: DynamicAgent) -> None:
-    try:
-        agent.dismantle()
-    except Exception:  # noqa: BLE001 - logged; the core agent stops what is left itself (deliverable section 3.2)
-        _log.exception("the RApp could not stop what it has started")
+def _dismantle(agent: DynamicAgent | None, *, has_cloud_agent: bool) -> None:
+    """The cloud agent goes last: what the RApp does in `dismantle` may need it."""
+    if agent is not None:
+        try:
+            agent.dismantle()
+        except Exception:  # noqa: BLE001 - logged; the core agent stops what is left itself (deliverable section 3.2)
+            _log.exception("the RApp could not stop what it has started")
+    if has_cloud_agent:
+        try:
+            stop_agent_wait()
+        except RappError as error:
+            _log.warning("%s; the core agent sees to it", error)

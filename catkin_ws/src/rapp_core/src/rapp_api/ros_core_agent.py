@@ -11,12 +11,14 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 import genpy
+import rapp_msgs.msg
 import rapp_msgs.srv
 import rospy
 from rospy.exceptions import ROSInternalException
 
 from rapp_api.core_agent import activity
 from rapp_api.errors import KINDS, Invalid, Refused, Unreachable
+from rapp_api.files import sorted_out
 from rapp_api.ros_body import RosBody
 
 CONNECT_TIMEOUT = 5.0  # s for the service to appear at the ROS master
@@ -59,13 +61,20 @@ class RosCoreAgent(RosBody):
         fields = {"path": path, "position": position, "volume": volume, "balance": balance, "loop": loop}
         self._call("rapp_play_audio", "PlayAudio", **fields)
 
-    def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float) -> Any:
+    def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float, agent: bool) -> Any:
         """See `CoreAgent`."""
+        values, files = sorted_out(service, arguments)
         try:
-            text = json.dumps(arguments, allow_nan=False)
+            text = json.dumps(values, allow_nan=False)
         except (TypeError, ValueError) as error:
             raise Invalid(f"cannot call {service}: its arguments are not JSON: {error}; give texts, numbers, lists") from error
-        return json.loads(self._call("rapp_cloud_call", "CloudCall", service=service, arguments=text, timeout=timeout).result)
+        sent = [rapp_msgs.msg.CallFile(parameter=name, name=path.name, data=data) for name, (path, data) in files.items()]
+        fields = {"service": service, "arguments": text, "timeout": timeout, "agent": agent, "files": sent}
+        return json.loads(self._call("rapp_cloud_call", "CloudCall", **fields).result)
+
+    def stop_cloud_agent(self) -> bool:
+        """See `CoreAgent`."""
+        return bool(self._call("rapp_stop_cloud_agent", "StopCloudAgent").stopped)
 
     def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
         """See `CoreAgent`."""

@@ -28,9 +28,10 @@ class FakeCoreAgent(FakeBody):
     """Implements `CoreAgent` in memory, with the real one's limits, and notes every call in `calls` as (name, argument).
 
     `hears` are the words the person says, one for each time the robot listens ("" for silence); `services` gives for each HOP
-    service its result, a function of its arguments, or the RappError it ends with; `mail` is "delivered", "kept", "locked" or a
-    RappError; `pictures` are what the cameras see, one after another; `walks` says how each walk ends (None: well); with `package`,
-    the folder of the RApp, calls that its package.json does not name are refused.
+    service its result, a function of its arguments (files are `Path`), or the RappError it ends with; `agent_services` does so for
+    the RApp's own cloud agent; `mail` is "delivered", "kept", "locked" or a RappError; `pictures` are what the cameras see, one
+    after another; `walks` says how each walk ends (None: well); with `package`, the folder of the RApp, calls that its package.json
+    does not name are refused.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class FakeCoreAgent(FakeBody):
         package: Path | None = None,
         pictures: Sequence[Image] = (),
         walks: Sequence[RappError | None] = (),
+        agent_services: Mapping[str, Service] | None = None,
     ) -> None:
         super().__init__(pictures, walks)
         self.calls: list[tuple[str, Any]] = []
@@ -50,6 +52,8 @@ class FakeCoreAgent(FakeBody):
         self.parameters: dict[str, Any] = {}
         self._hears = list(hears)
         self._services = dict(services or {})
+        self._agent_services = dict(agent_services or {})
+        self._partner = agent_services is not None
         self._mail = mail
         self._package = package
         self._core: frozenset[str] | None = None
@@ -63,6 +67,7 @@ class FakeCoreAgent(FakeBody):
         self.parameters = rapp.get("parameters", {})
         self._core = frozenset(rapp["permissions"]["core"])
         self._cloud = frozenset(rapp["permissions"]["cloud"])
+        self._partner = rapp.get("partner") is not None
 
     def __enter__(self) -> "FakeCoreAgent":
         self._end = use(self)
@@ -122,17 +127,29 @@ class FakeCoreAgent(FakeBody):
         _check(own or path in self.recordings, f"read {path}: give a file of the package or a recording")
         self.calls.append(("play_audio", path))
 
-    def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float) -> Any:
-        """What `services` says."""
-        self._allow(service, self._cloud)
-        arguments = json.loads(_json(service, arguments))
-        self.calls.append(("cloud_call", service))
-        if service not in self._services:
+    def cloud_call(self, service: str, arguments: dict[str, Any], timeout: float, agent: bool) -> Any:
+        """What `services`, or `agent_services`, says."""
+        if not agent:
+            self._allow(service, self._cloud)
+        elif not self._partner:
+            raise Refused("cannot call a cloud agent: the RApp's package.json names no partner")
+        files = {name: value for name, value in arguments.items() if isinstance(value, Path)}
+        plain = {name: value for name, value in arguments.items() if name not in files}
+        arguments = json.loads(_json(service, plain)) | files
+        self.calls.append(("agent_call" if agent else "cloud_call", service))
+        services = self._agent_services if agent else self._services
+        if service not in services:
             raise Refused(f"cannot call {service}: it is not among this test's services")
-        answer = self._services[service]
+        answer = services[service]
         if isinstance(answer, RappError):
             raise answer
         return answer(arguments) if callable(answer) else answer
+
+    def stop_cloud_agent(self) -> bool:
+        """Note it."""
+        self.calls.append(("stop_cloud_agent", None))
+        there, self._partner = self._partner, False
+        return there
 
     def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
         """Note the mail; answer what `mail` says."""

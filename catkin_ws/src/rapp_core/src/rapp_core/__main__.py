@@ -11,6 +11,7 @@ import rospy
 
 from rapp_agent import Subsystem
 from rapp_core.config import Config, read
+from rapp_core.control.cloud_agent import CloudAgents
 from rapp_core.control.control import Control, Parts
 from rapp_core.control.fsm import core_machine
 from rapp_core.control.platform import Platform
@@ -75,9 +76,9 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     trace.listen(states.tell)
     context, hop = Context(nao, config, trace, config.home / "listening", cut=stop), RosHop(stop, trace)
     executor = Executor(context)
-    platform = Platform(hop, config)
-    control = Control(Parts(nao, hop, launcher, executor, platform, lease, trace, config, stop))
-    RosServices(executor, Outside(hop, config, stop), Keepsakes(config), lease, trace)
+    platform, cloud_agents = Platform(hop, config), CloudAgents(hop, config)
+    control = Control(Parts(nao, hop, launcher, executor, platform, cloud_agents, lease, trace, config, stop))
+    RosServices(executor, Outside(hop, cloud_agents, config, stop), Keepsakes(config), lease, trace)
     RosActions(executor, lease, trace)
     machine, rejoining = core_machine(control), Rejoining()
     machine.listen(trace.core_event)

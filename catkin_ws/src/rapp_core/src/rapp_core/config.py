@@ -26,6 +26,7 @@ class Limits:
     private: int = 64 << 20  # bytes of all files in its private folder, in memory
     kept: int = 64 << 20  # bytes of all files the RApp has the core agent keep, of all its runs
     kept_file: int = 8 << 20  # bytes of one of them
+    sent: int = 16 << 20  # bytes of the files handed over with one call
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,8 @@ class Config:
     catalogue_again: float = 60.0  # s between looks at the platform's catalogue
     interpret_timeout: float = 30.0  # s
     install_timeout: float = 60.0  # s
+    cloud_agent_start: float = 10.0  # s for the platform to start a RApp's cloud agent
+    cloud_agent_stop: float = 3.0  # s that a dynamic agent waits for its end; the core agent itself waits a third of it
     cloud_call_timeout: float = 30.0  # s for a dynamic agent's cloud call unless told otherwise
     mail_timeout: float = 60.0  # s
     link_back: float = 15.0  # s from a mail's first try in which a link that is away may come back and take it

@@ -19,6 +19,7 @@ class Manifest:
     parameters: dict[str, Any]
     core: frozenset[str]  # core services it may call
     cloud: frozenset[str]  # calls that leave the robot it may make
+    partner: str | None = None  # the package of its cloud agent, in a four-agent RApp
 
 
 def read_manifest(package: Path) -> Manifest:
@@ -34,6 +35,7 @@ def read_manifest(package: Path) -> Manifest:
             parameters=dict(rapp.get("parameters", {})),
             core=frozenset(map(str, rapp["permissions"]["core"])),
             cloud=frozenset(map(str, rapp["permissions"]["cloud"])),
+            partner=None if rapp.get("partner") is None else str(rapp["partner"]),
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Invalid(f"cannot use {package}: its package.json is broken ({error!r}); install it anew") from error

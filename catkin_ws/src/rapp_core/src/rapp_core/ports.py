@@ -103,6 +103,9 @@ class Hop(Protocol):
     def request(self, name: str, arguments: Mapping[str, Any], timeout: float) -> Any:
         """Ask, wait for the end of the job, give its JSON result. Raises Refused, Unreachable, Invalid, Bug."""
 
+    def keep(self, run: str) -> None:
+        """Tell the link that a run with a cloud agent lives; "": none does. Returns at once, also without a link."""
+
     @property
     def present(self) -> bool:
         """Whether the link is there at this moment."""

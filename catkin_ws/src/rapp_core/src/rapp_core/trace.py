@@ -1,12 +1,13 @@
 """One hook for all that happens: states, what was said and heard, messages between agents; log, tests, screens listen."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from rapp_agent import Event
 
 Kind = Literal["entered", "left", "failed", "said", "heard", "message"]
+_DYNAMIC_KINDS = ("entered", "left", "failed")  # that a dynamic agent may tell of itself
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,17 @@ class Trace:
     def note(self, text: str) -> None:
         """What the core agent has decided or done by itself."""
         self.message("core", f"core: {text}")
+
+    def of_dynamic(self, message: Mapping[str, Any]) -> None:
+        """What has passed over a dynamic agent's channel."""
+        kind = message["type"]
+        if kind == "state" and message.get("kind") in _DYNAMIC_KINDS:
+            fields = [str(message.get(name, ""))[:200] for name in ("machine", "state", "kind", "detail")]
+            self.tell(Happening("dynamic", fields[0], fields[1], fields[2], fields[3]))  # type: ignore[arg-type]
+        elif kind == "activate":
+            self.send("core", "dynamic", "activate")
+        elif kind != "state":
+            self.send("dynamic", "core", kind)
 
     def message(self, agent: str, text: str) -> None:
         """A message told by the agent that sent or received it, in the form that rapp_msgs/AgentState describes."""

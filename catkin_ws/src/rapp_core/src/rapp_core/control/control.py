@@ -6,32 +6,27 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rapp_agent import Subsystem
 from rapp_core.body_ports import Movement
 from rapp_core.config import Config
+from rapp_core.control.cloud_agent import CloudAgents
 from rapp_core.control.listening import Listener
 from rapp_core.control.platform import Platform
 from rapp_core.control.question import which
-from rapp_core.control.refusals import not_installed, not_interpreted
+from rapp_core.control.refusals import not_installed, not_interpreted, not_started
+from rapp_core.control.words import NONE_OF_THEM, NOT_UNDERSTOOD, READY, READY_ALONE
 from rapp_core.errors import CoreError, Refused, Unreachable
 from rapp_core.launcher.lease import Lease
 from rapp_core.ports import Agent, Agents, Hop, Robot
 from rapp_core.services.executor import Executor
-from rapp_core.trace import Happening, Trace
+from rapp_core.trace import Trace
 
 _log = logging.getLogger(__name__)
 STEP = 0.05  # s between two looks at the dynamic agent
 HURRIED = 0.2  # s for a dynamic agent that did not end by itself to stop what it has started
 RESTING = 0.3  # s in which the robot is seen to begin to rest before the core agent leaves it
 RETRY = 1.0  # s between tries to reach the robot
-DYNAMIC_KINDS = ("entered", "left", "failed")
-
-READY = "I am ready"
-READY_ALONE = "I am ready, but I cannot reach the platform"
-NOT_UNDERSTOOD = "I did not understand you"
-NONE_OF_THEM = "All right, I do nothing"
 
 
 @dataclass(frozen=True)
@@ -43,6 +38,7 @@ class Parts:
     launcher: Agents
     executor: Executor
     platform: Platform
+    cloud_agents: CloudAgents
     lease: Lease
     trace: Trace
     config: Config
@@ -77,6 +73,7 @@ class Control:
     def register(self, _share: Subsystem) -> None:
         """Register with the repository agent, and say that the robot is ready."""
         registered = self._parts.platform.register()
+        self._parts.cloud_agents.forget()
         self._say(READY if registered else READY_ALONE)
 
     # s3 to s6: from a command to a package
@@ -150,14 +147,15 @@ class Control:
     # s7 to s9: the dynamic agent lives
 
     def activate(self, share: Subsystem) -> None:
-        """Start the dynamic agent and give it the lease."""
+        """Start the dynamic agent and give it the lease; its cloud agent, if it has one, is started beside it."""
         parts = self._parts
         try:
-            self._run = parts.launcher.activate(Path(str(share.memory["package"])), self._told)
+            self._run = parts.launcher.activate(Path(str(share.memory["package"])), parts.trace.of_dynamic)
         except CoreError as error:
             self._problem(share, "I cannot start it", error)
             return
         parts.lease.grant(self._run)
+        parts.cloud_agents.begin(self._run)
         share.memory["until"] = parts.now() + parts.config.first_word
 
     def await_first_word(self, share: Subsystem) -> None:
@@ -169,6 +167,7 @@ class Control:
         if late or self._parts.stop.is_set() or self._parts.lease.problem(True) is not None or run.outcome is not None:
             _log.warning("run %s: no first word: %s", run.name, run.outcome or "dead, silent or late")
             share.memory["problem"] = "It did not start"
+        self._look_at_cloud_agent(share)
 
     def first_word_or_over(self, share: Subsystem) -> bool:
         """Whether it has spoken, or never will."""
@@ -184,12 +183,18 @@ class Control:
                 _log.warning("run %s: %s", run.name, problem)
                 share.memory["problem"] = problem
 
+    def _look_at_cloud_agent(self, share: Subsystem) -> None:
+        error = self._parts.cloud_agents.problem()
+        if error is not None:
+            self._problem(share, not_started(error), error)
+
     def over(self, share: Subsystem) -> bool:
         """Whether the dynamic agent has finished, failed, died, or gone silent."""
         outcome = self._present().outcome
         if outcome is not None and outcome[0] != "done":
             share.memory["problem"] = "It has failed"
             _log.warning("the dynamic agent failed: %s", outcome[1])
+        self._look_at_cloud_agent(share)
         return outcome is not None or share.memory["problem"] is not None or self._parts.stop.is_set()
 
     # s10, s11: destroy, apologise
@@ -206,12 +211,20 @@ class Control:
         if run.alive:
             parts.trace.send("core", "dynamic", "dismantle")
             run.dismantle(parts.config.dismantle if run.outcome is not None else HURRIED, parts.stop)
+        self._stop_cloud_agent(run)
         parts.lease.release()
         self._still()
         parts.executor.put_back()
         self._close_senses()
         self._end_run()
         parts.launcher.prepare()
+
+    def _stop_cloud_agent(self, run: Agent) -> None:
+        """The dynamic agent has stopped its cloud agent; if it could not, the core agent does, before it ends the dynamic one."""
+        try:
+            self._parts.cloud_agents.stop(run, self._parts.config.cloud_agent_stop / 3)
+        except CoreError as error:
+            _log.warning("%s; the platform stops it with the robot's lease", error)
 
     def _end_run(self) -> None:
         run, parts = self._present(), self._parts
@@ -249,6 +262,7 @@ class Control:
         """Stop the robot, end a run that still lives, let the robot rest."""
         self._parts.lease.release()
         reached = self._still()
+        self._parts.cloud_agents.forget()
         if self._run is not None:
             self._end_run()
         resting = self._let_rest() if reached else None
@@ -285,13 +299,3 @@ class Control:
             _log.warning("%s", error)
             return False
         return True
-
-    def _told(self, message: dict[str, Any]) -> None:
-        trace = self._parts.trace
-        if message["type"] == "state" and message.get("kind") in DYNAMIC_KINDS:
-            fields = [str(message.get(name, ""))[:200] for name in ("machine", "state", "kind", "detail")]
-            trace.tell(Happening("dynamic", fields[0], fields[1], fields[2], fields[3]))  # type: ignore[arg-type]
-        elif message["type"] == "activate":
-            trace.send("core", "dynamic", "activate")
-        elif message["type"] != "state":
-            trace.send("dynamic", "core", message["type"])

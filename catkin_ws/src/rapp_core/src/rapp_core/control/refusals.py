@@ -1,4 +1,4 @@
-"""Why something was not installed, or not interpreted, in words for the person. Pure."""
+"""Why something was not installed, not interpreted or not started, in words for the person. Pure."""
 
 from rapp_core.errors import CoreError, Unreachable
 
@@ -28,3 +28,8 @@ def not_installed(name: str, error: CoreError) -> str:
 def not_interpreted(error: CoreError) -> str:
     """What to say of a long command that was not interpreted."""
     return AWAY if isinstance(error, Unreachable) else ODD
+
+
+def not_started(error: CoreError) -> str:
+    """What to say of a RApp whose cloud agent was not started."""
+    return AWAY if isinstance(error, Unreachable) else "I cannot start its part in the cloud"

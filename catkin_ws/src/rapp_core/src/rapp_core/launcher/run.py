@@ -98,6 +98,7 @@ class Run:
             package=INSIDE_PACKAGE,
             entry=manifest.entry,
             parameters=manifest.parameters,
+            cloud_agent=manifest.partner is not None,
         )
 
     def dismantle(self, patience: float, hurry: Signal) -> bool:

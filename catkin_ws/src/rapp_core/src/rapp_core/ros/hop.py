@@ -36,6 +36,7 @@ class RosHop:
         self._alive = float("-inf")
         self._boot = ""  # of the link's process
         self._cancel = rospy.Publisher("rapp_hop/cancel", String, queue_size=10)
+        self._runs = rospy.Publisher("rapp_hop/runs", String, queue_size=10)
         self._events = rospy.Subscriber("rapp_hop/events", HopEvent, self._take, queue_size=1000, tcp_nodelay=True)
         rospy.Subscriber("rapp_hop/alive", String, self._sign_of_life, queue_size=10, tcp_nodelay=True)
 
@@ -47,6 +48,10 @@ class RosHop:
     def _reachable(self) -> bool:
         """Whether the link is there and its events would arrive: each topic is connected by itself."""
         return self.present and self._events.get_num_connections() > 0
+
+    def keep(self, run: str) -> None:
+        """See `ports.Hop`."""
+        self._runs.publish(run)
 
     def request(self, name: str, arguments: Mapping[str, Any], timeout: float) -> Any:
         """See `ports.Hop`."""

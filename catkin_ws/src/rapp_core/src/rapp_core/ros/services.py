@@ -13,13 +13,14 @@ from rapp_core.launcher.lease import Grant, Lease
 from rapp_core.ros.conversions import fields, fill
 from rapp_core.services.executor import Executor
 from rapp_core.services.keepsakes import Keepsakes
-from rapp_core.services.outside import Outside
+from rapp_core.services.outside import CloudCall, Outside
+from rapp_core.services.sendable import CallFile
 from rapp_core.services.table import CORE_SERVICES, CoreService
 from rapp_core.trace import Trace
 
 _log = logging.getLogger(__name__)
 Handler = Callable[[Grant, Any, Any], None]
-OUTSIDE = frozenset({"rapp_cloud_call", "rapp_send_mail"})  # allowed call by call, see `services.outside`
+OUTSIDE = frozenset({"rapp_cloud_call", "rapp_stop_cloud_agent", "rapp_send_mail"})  # allowed call by call, see `services.outside`
 
 
 class RosServices:
@@ -34,6 +35,7 @@ class RosServices:
         for row in CORE_SERVICES:
             self._offer(row.name, row.srv, self._core(row))
         self._offer("rapp_cloud_call", "CloudCall", self._cloud_call)
+        self._offer("rapp_stop_cloud_agent", "StopCloudAgent", self._stop_cloud_agent)
         self._offer("rapp_send_mail", "SendMail", self._send_mail)
         self._offer("rapp_keep", "Keep", self._keep)
 
@@ -68,7 +70,12 @@ class RosServices:
         return execute
 
     def _cloud_call(self, grant: Grant, request: Any, response: Any) -> None:
-        response.result = self._outside.cloud_call(grant.run, request.service, request.arguments, request.timeout)
+        files = [CallFile(each.parameter, each.name, bytes(each.data)) for each in request.files]
+        call = CloudCall(request.service, request.arguments, request.timeout, request.agent, files)
+        response.result = self._outside.cloud_call(grant.run, call)
+
+    def _stop_cloud_agent(self, grant: Grant, _request: Any, response: Any) -> None:
+        response.stopped = self._outside.stop_cloud_agent(grant.run)
 
     def _send_mail(self, grant: Grant, request: Any, response: Any) -> None:
         response.state = self._outside.send_mail(grant.run, request.recipients, request.subject, request.body, request.attachment)

@@ -5,39 +5,66 @@ import json
 import threading
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rapp_core.config import Config
+from rapp_core.control.cloud_agent import CloudAgents
 from rapp_core.errors import Invalid, Refused, Unreachable
 from rapp_core.ports import Agent, Hop
+from rapp_core.services.sendable import CallFile, Sendable
 
 MAIL_AGAIN = 0.5  # s between tries to hand a mail to a link that is away
 
 
-class Outside:
-    """rapp_cloud_call and rapp_send_mail; a RApp may use only what its package.json names."""
+@dataclass(frozen=True)
+class CloudCall:
+    """A dynamic agent's call of a HOP service."""
 
-    def __init__(self, hop: Hop, config: Config, stop: threading.Event, now: Callable[[], float] = time.monotonic) -> None:
+    service: str
+    arguments: str  # JSON object; {"file": path} stands for a file
+    timeout: float = 0.0  # s; 0: our own
+    agent: bool = False  # of its own cloud agent, instead of the repository agent
+    files: Sequence[CallFile] = ()  # further parameters, handed over with the call
+
+
+class Outside:
+    """rapp_cloud_call, rapp_stop_cloud_agent, rapp_send_mail; a RApp may use what its package.json names, and its cloud agent."""
+
+    def __init__(
+        self,
+        hop: Hop,
+        cloud_agents: CloudAgents,
+        config: Config,
+        stop: threading.Event,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
         """No new try after `stop` is set."""
         self._hop = hop
+        self._cloud_agents = cloud_agents
         self._config = config
         self._stop = stop
         self._now = now
         self._numbers = itertools.count(1)
 
-    def cloud_call(self, run: Agent, service: str, arguments: str, timeout: float) -> str:
+    def cloud_call(self, run: Agent, call: CloudCall) -> str:
         """Call a HOP service; gives its JSON result. Raises Refused, Unreachable, Invalid, Bug."""
-        self._allowed(run, service)
-        try:
-            values = json.loads(arguments or "{}")
-        except ValueError as error:
-            raise Invalid(f"cannot call {service}: its arguments are no JSON ({error})") from error
-        if not isinstance(values, dict):
-            raise Invalid(f"cannot call {service}: its arguments must be a JSON object")
-        limit = timeout if timeout > 0 else self._config.cloud_call_timeout
-        result = self._hop.request("call", {"service": service, "arguments": values}, limit)
-        return json.dumps(result)
+        until = self._now() + (call.timeout if call.timeout > 0 else self._config.cloud_call_timeout)
+        request: dict[str, Any] = {"service": call.service}
+        if call.agent:
+            request["agent"] = self._cloud_agents.name_for(run, max(0.0, until - self._now()))
+        else:
+            self._allowed(run, call.service)
+        arguments = _arguments(call.service, call.arguments)
+        sendable = Sendable(run, self._config)
+        sendable.check(arguments)
+        with sendable.written(call.files) as files:
+            return json.dumps(self._hop.request("call", request | {"arguments": arguments | files}, max(0.1, until - self._now())))
+
+    def stop_cloud_agent(self, run: Agent) -> bool:
+        """Have the run's cloud agent stopped (deliverable section 3.2); gives whether there was one. Raises CoreError."""
+        return self._cloud_agents.stop(run, self._config.cloud_agent_stop)
 
     def send_mail(self, run: Agent, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
         """Have a mail sent (paper Fig. 12); gives "delivered", "kept" or "locked". Raises Refused, Unreachable, Invalid, Bug."""
@@ -69,3 +96,13 @@ class Outside:
     def _allowed(run: Agent, service: str) -> None:
         if run.manifest is None or service not in run.manifest.cloud:
             raise Refused(f"cannot call {service}: the RApp's package.json does not name it under permissions.cloud")
+
+
+def _arguments(service: str, text: str) -> dict[str, Any]:
+    try:
+        values = json.loads(text or "{}")
+    except ValueError as error:
+        raise Invalid(f"cannot call {service}: its arguments are no JSON ({error})") from error
+    if not isinstance(values, dict):
+        raise Invalid(f"cannot call {service}: its arguments must be a JSON object")
+    return values
