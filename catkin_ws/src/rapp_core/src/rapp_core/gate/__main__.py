@@ -25,6 +25,7 @@ BEAT = 0.25  # s between two signs of life
 FAREWELL = 0.5  # s for the robot's master to take note of the end
 MEMORY = 1 << 30  # bytes of address space: whatever a RApp sends, the robot keeps its memory
 FILES = 512
+LINES = 200  # in the log
 ACCOUNT = 65533  # user id of gates that root starts (Debian policy section 9.2.2)
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 
@@ -38,11 +39,25 @@ def main() -> int:
     logging.basicConfig(
         level=logging.INFO, format=f"%(asctime)s gate of {options.node} %(levelname)s %(message)s", stream=sys.stderr
     )
+    logging.getLogger().handlers[0].addFilter(Few())
     _confine()
     with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
         runner.run(_serve(options))
     logging.shutdown()
     os._exit(0)  # a thread may still wait for the ROS master
+
+
+class Few(logging.Filter):
+    """Lets so many lines of one run into the log: what a RApp has refused to it must not fill the disk."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._count = 0
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """See logging."""
+        self._count += 1
+        return self._count <= LINES
 
 
 def _confine() -> None:

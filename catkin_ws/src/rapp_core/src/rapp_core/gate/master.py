@@ -16,7 +16,6 @@ from rapp_core.gate.rules import Rules
 from rapp_core.gate.upstream import Upstream
 
 PARAMETERS = {"/use_sim_time": False, "/tcp_keepalive": True}  # what rospy asks for when a node begins
-TOLD = 50  # refusals that are logged in one run
 SILENT = frozenset({"/rosout"})  # may be published to, and goes nowhere: a RApp prints into its own log
 
 _log = logging.getLogger(__name__)
@@ -33,7 +32,6 @@ class Master:
         self.publish_api: Callable[[], Awaitable[str]] | None = None
         """Opens the gate's own XMLRPC API towards the robot's nodes, and gives its URI."""
         self._upstream, self._uri, self._relay = upstream, uri, relay
-        self._told = 0
         self._methods: dict[str, Callable[..., Awaitable[Outcome]]] = {
             "registerPublisher": self._register_publisher,
             "unregisterPublisher": self._unregister_publisher,
@@ -68,10 +66,8 @@ class Master:
             return -1, str(error), 0
 
     def refuse(self, text: str) -> Outcome:
-        """An answer that something is not allowed; noted in the log, as long as that is not too often."""
-        self._told += 1
-        if self._told <= TOLD:
-            _log.warning("%s", text)
+        """An answer that something is not allowed; noted in the log."""
+        _log.warning("%s", text)
         return -1, text, 0
 
     async def _register_publisher(self, _caller: str, topic: str, _kind: str, api: str) -> Outcome:
