@@ -1,4 +1,4 @@
-"""What the simulated robot's camera sees from anywhere in its room, without a running simulator: its own renderer, in this process."""
+"""What the simulated robot's camera sees from anywhere in its room, without a running simulator: its renderer, in this process."""
 
 import math
 from collections.abc import Callable, Mapping

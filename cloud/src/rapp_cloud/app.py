@@ -18,6 +18,7 @@ from rapp_cloud.robots import Robots
 from rapp_cloud.services.people import people_services
 from rapp_cloud.services.presence import presence_services
 from rapp_cloud.services.runs import run_services
+from rapp_cloud.services.sight import sight_services
 from rapp_cloud.services.voice import voice_services
 from rapp_cloud.shelf import Shelf
 from rapp_cloud.static import store_files
@@ -83,6 +84,7 @@ def _registry(config: CloudConfig, shelf: Shelf, workers: Workers) -> ServiceReg
             *people_services(Profiles(config.data / "profiles")),
             *run_services(Reports(config.data / "reports")),
             *voice_services(robots, shelf, run),
+            *sight_services(),
         ]
     )
 

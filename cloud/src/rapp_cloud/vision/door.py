@@ -21,6 +21,7 @@ SURE = 0.5  # confidence from which the answer counts
 CLOSED = math.radians(5.0)  # up to which a door counts as closed
 MOST = 60  # rectangles that are looked at
 BESIDE_FOOT = 0.015  # of its distance below the horizon that a hinge stands beside the wall's foot
+WHOLE = 0.45  # share of each edge of a closed leaf: pieces of a wall have such edges only in part
 AS_CLEAR = 0.6  # share of the wall's strength
 UNKNOWN_FOOT = 0.8  # for a wall whose foot is not seen
 
@@ -67,7 +68,7 @@ def _like_a_door(leaf: Outline) -> bool:
 def _rank(leaf: Outline) -> float:
     """Of two rectangles in one another, such as a leaf and its panels, the larger one is the door."""
     reach = leaf.bottom * 2 if leaf.top is None else leaf.bottom - leaf.top
-    return leaf.support * (reach * (1 + leaf.t * (leaf.x1 + leaf.x2) / 2)) ** 0.2
+    return float(leaf.support * (reach * (1 + leaf.t * (leaf.x1 + leaf.x2) / 2)) ** 0.2)
 
 
 def _hinged(leaf: Outline, wall: Wall, picture: Level) -> float:
@@ -77,13 +78,15 @@ def _hinged(leaf: Outline, wall: Wall, picture: Level) -> float:
     ends = [(leaf.bottom * (1 + leaf.t * x), wall.foot * (1 + math.tan(wall.direction) * x)) for x in (leaf.x1, leaf.x2)]
     away = min(abs(stands - foot) for stands, foot in ends)
     tolerance = BESIDE_FOOT * max(foot for _, foot in ends) + 1.5 / picture.focal
-    return math.exp(-((away / tolerance) ** 2) / 2)
+    return float(math.exp(-((away / tolerance) ** 2) / 2))
 
 
 def _solid(leaf: Outline, wall: Wall, edges: Edges) -> float:
-    """Whether what lies in the wall's plane ends at the floor as clearly as the wall: a doorway, at a seam, does not."""
+    """Whether what lies in the wall's plane is a leaf, and ends at the floor as clearly as the wall: a doorway, at a seam, does not."""
     if wall.foot is None or _between(math.atan(leaf.t), wall.direction) > CLOSED:
         return 1.0
+    if leaf.weakest < WHOLE:
+        return 0.0
     (bottom,) = edges.strength(leaf.x1, leaf.x2, leaf.t, np.array([leaf.bottom]))
     return float(min(1.0, bottom / wall.strength / AS_CLEAR))
 

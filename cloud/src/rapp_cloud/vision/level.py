@@ -82,7 +82,7 @@ def _segments(image: Image) -> Array:
     rows = [np.asarray(lines, np.float64).reshape(-1, 4) for lines in found if lines is not None]
     segments = np.concatenate(rows) if rows else np.empty((0, 4))
     long = np.hypot(*(segments[:, 2:] - segments[:, :2]).T) >= SHORTEST * height / 2
-    segments = segments[long]
+    segments = np.asarray(segments[long], np.float64)
     swap = segments[:, 0] > segments[:, 2]
     segments[swap] = segments[swap][:, [2, 3, 0, 1]]
     return segments

@@ -15,10 +15,12 @@ from rapp_cloud.vision.level import Image
 WORKING = 320  # pixels that the picture is wide when it is looked at
 SEED = 0.012  # of the width: radius of the patch in the middle that the lamp is grown from
 SMOOTH = 3.0  # levels of 256 by which neighbours in a lamp may differ
+THIN = 0.25  # of the patch's size, of a part that does not belong to the lamp
 SMALLEST, LARGEST = 0.002, 0.3  # of the picture, that a lamp may fill
 RING = 0.8  # of the lamp's radius: how far round it the surroundings reach
 DARK, BRIGHT = 0.9, 1.1  # times the brightness of the surroundings: a lamp as dark as this is off, one as bright as this is on
-SURE = 0.5  # confidence from which the answer counts
+SURE = 0.7  # confidence from which the answer counts
+ON = 50  # level from which a lamp counts as on
 STEP = 12.0  # levels of 256: a contrast at which the lamp's edge is clear
 
 
@@ -40,8 +42,8 @@ def look_at_lamp(image: Image) -> Light:
     height, width = image.shape[:2]
     scale = WORKING / width
     small = cv2.resize(image, (WORKING, max(1, round(height * scale))), interpolation=cv2.INTER_AREA)
-    smooth = cv2.bilateralFilter(cv2.medianBlur(small, 3), 7, 12, 4)
-    lamp = _patch(np.asarray(smooth, np.uint8))
+    smooth = np.asarray(cv2.bilateralFilter(cv2.medianBlur(small, 3), 7, 12, 4), np.uint8)
+    lamp = _patch(smooth)
     area = int(lamp.sum())
     if not SMALLEST * lamp.size <= area <= LARGEST * lamp.size or _cut(lamp):
         return Light(None, 0.0)
@@ -63,7 +65,9 @@ def _patch(image: Image) -> NDArray[np.bool_]:
     step, how = (SMOOTH,) * 3, 8 | (255 << 8) | cv2.FLOODFILL_MASK_ONLY
     for x, y in ((0, 0), (-reach, 0), (reach, 0), (0, -reach), (0, reach)):
         cv2.floodFill(image.copy(), mask, (width // 2 + x, height // 2 + y), (0.0,), step, step, how)
-    found = cv2.morphologyEx(mask[1:-1, 1:-1], cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    found = mask[1:-1, 1:-1]
+    thin = max(3, round(THIN * math.sqrt(np.count_nonzero(found))) | 1)  # a stand, as dark as a lamp that is off
+    found = cv2.morphologyEx(found, cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (thin, thin)))
     _, labels = cv2.connectedComponents(found)
     own = labels[height // 2 - reach : height // 2 + reach + 1, width // 2 - reach : width // 2 + reach + 1]
     numbers, counts = np.unique(own[own > 0], return_counts=True)

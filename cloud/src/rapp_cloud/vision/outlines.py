@@ -40,6 +40,7 @@ class Outline:
     top: float | None
     bottom: float
     support: float  # 0 to 1: share of its edges that are seen
+    weakest: float  # share of the one that is seen least
 
     @property
     def width(self) -> float:
@@ -219,7 +220,7 @@ def _judged(
         shares.append(seen * (1 - 0.8 * (beyond or 0.0)))
     if min(shares) < LEAST:
         return
-    yield Outline(x1, x2, t, top[0], bottom[0], math.prod(shares) ** 0.25)
+    yield Outline(x1, x2, t, top[0], bottom[0], math.prod(shares) ** 0.25, min(shares))
 
 
 def fitted(picture: Level, outline: Outline) -> Outline:

@@ -48,7 +48,7 @@ def _of_the_wall(edge: Array, leaf: Outline, picture: Level) -> bool:
     x, y = (x1 + x2) / 2, (y1 + y2) / 2
     if leaf.x1 < x < leaf.x2 and (leaf.top is None or y > 1.01 * leaf.top * (1 + leaf.t * x)):
         return False
-    return y < 1.02 * leaf.bottom * max(1 + leaf.t * leaf.x1, 1 + leaf.t * leaf.x2)
+    return bool(y < 1.02 * leaf.bottom * max(1 + leaf.t * leaf.x1, 1 + leaf.t * leaf.x2))
 
 
 def _vote(edge: Array, leaf: Outline, picture: Level) -> tuple[float, float]:
