@@ -10,11 +10,16 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 from rapp_cloud.accounts import Accounts
+from rapp_cloud.cloud_agents.agents import CloudAgents, Quota
+from rapp_cloud.cloud_agents.doors import Doors
+from rapp_cloud.cloud_agents.engine import LocalProcesses
+from rapp_cloud.cloud_agents.packages import Packages
 from rapp_cloud.config import CloudConfig
 from rapp_cloud.interpreter.port import Commands, Interpretation, Interpreter
 from rapp_cloud.profiles import Profiles
 from rapp_cloud.reports import Reports
 from rapp_cloud.robots import Robots
+from rapp_cloud.services.agents import agent_calls, agent_services
 from rapp_cloud.services.people import people_services
 from rapp_cloud.services.presence import presence_services
 from rapp_cloud.services.runs import run_services
@@ -51,20 +56,27 @@ async def running_cloud(config: CloudConfig) -> AsyncIterator[int]:
     """
     shelf = open_shelf(config.data)
     await asyncio.to_thread(_prepare, shelf, config)
-    workers = Workers(load_interpreter, config.workers)
-    server = HopServer(_registry(config, shelf, workers), Accounts(config.tokens).robot_of, config.data / "uploads", [
+    workers, robots = Workers(load_interpreter, config.workers), Robots(time.monotonic, config.lease)
+    doors = Doors(config.data / "agents", config.data / "uploads", Accounts(config.tokens).robot_of)
+    agents = _cloud_agents(config, shelf, robots, doors)
+    server = HopServer(_registry(config, shelf, workers, robots, agents), doors.caller, config.data / "uploads", [
         store_files("/tuf/metadata/", shelf.metadata),
         store_files("/tuf/targets/", shelf.targets),
+        agent_calls(agents),
     ])  # fmt: skip
     refreshing = asyncio.create_task(_keep_fresh(shelf, config.refresh))
     try:
         await workers.start()
+        await agents.open()
+        server.listen_unix(doors.platform)
         yield server.listen(config.port, config.address)
     finally:
         refreshing.cancel()
         await asyncio.gather(refreshing, return_exceptions=True)
+        await agents.close()
         await server.close()
         await workers.close()
+        doors.close()
 
 
 def _prepare(shelf: Shelf, config: CloudConfig) -> None:
@@ -75,8 +87,13 @@ def _prepare(shelf: Shelf, config: CloudConfig) -> None:
         _log.info("on offer: %s %s", manifest.name, manifest.version)
 
 
-def _registry(config: CloudConfig, shelf: Shelf, workers: Workers) -> ServiceRegistry:
-    robots = Robots(time.monotonic, config.lease)
+def _cloud_agents(config: CloudConfig, shelf: Shelf, robots: Robots, doors: Doors) -> CloudAgents:
+    folder = config.data / "agents"
+    engine = LocalProcesses(folder, doors.open)
+    return CloudAgents(engine, Packages(shelf, folder / "packages"), robots.is_here, Quota(config.agents_of_one, config.agents))
+
+
+def _registry(config: CloudConfig, shelf: Shelf, workers: Workers, robots: Robots, agents: CloudAgents) -> ServiceRegistry:
     run = functools.partial(_interpret, workers, config.interpret_timeout)
     return ServiceRegistry(
         [
@@ -84,6 +101,7 @@ def _registry(config: CloudConfig, shelf: Shelf, workers: Workers) -> ServiceReg
             *people_services(Profiles(config.data / "profiles")),
             *run_services(Reports(config.data / "reports")),
             *voice_services(robots, shelf, run),
+            *agent_services(agents, robots),
             *sight_services(),
         ]
     )

@@ -25,6 +25,8 @@ class CloudConfig:
     workers: int = os.cpu_count() or 1  # processes for interpretation
     interpret_timeout: float = 30.0  # seconds for one sentence
     lease: float = 15.0  # seconds without a heartbeat until a robot counts as gone
+    agents: int = 32  # cloud agents at once
+    agents_of_one: int = 4  # of one robot
     refresh: float = 3600.0  # seconds between two new timestamps of the store
 
     @property
@@ -62,7 +64,8 @@ def _typed(name: str, value: Any) -> Any:
         if not isinstance(value, list):
             raise Invalid("cannot use the setting publish: it must be a list of folders")
         return tuple(Path(item) for item in value)
-    kind: type[Any] = {"address": str, "token_file": Path, "port": int, "workers": int}.get(name, float)
+    whole = dict.fromkeys(("port", "workers", "agents", "agents_of_one"), int)
+    kind: type[Any] = {"address": str, "token_file": Path, **whole}.get(name, float)
     try:
         found = kind(value)
     except (TypeError, ValueError):
