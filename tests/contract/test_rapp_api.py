@@ -98,6 +98,7 @@ Side = Desk | Robot
 WRONG: list[tuple[type[Exception], str, Callable[..., Any], tuple[Any, ...]]] = [
     (Invalid, "text", communication.text_to_speech, (" ",)),
     (Invalid, "text", communication.text_to_speech, ("x" * 4001,)),
+    (Invalid, "", communication.text_to_speech, ("\ud800",)),
     (Refused, "'tlh'", communication.text_to_speech, ("nuqneH", "tlh")),
     (Invalid, "words", communication.word_spotting, ([],)),
     (Invalid, "words", communication.word_spotting, (["clock", " "],)),
@@ -115,12 +116,16 @@ WRONG: list[tuple[type[Exception], str, Callable[..., Any], tuple[Any, ...]]] = 
     (Invalid, "balance", communication.play_audio, ("x.ogg", 0.0, 1.0, NAN)),
     (Invalid, "position", communication.play_audio, ("x.ogg", -1.0)),
     (Invalid, "numbers", navigation.move_to, (NAN, 0.0, 0.0)),
+    (Invalid, "", navigation.move_to, (1e308, 0.0, 0.0)),
+    (Invalid, "", navigation.move_to, ("far", 0.0, 0.0)),
     (Refused, "10 m", navigation.move_to, (11.0, 0.0, 0.0)),
     (Invalid, "numbers", navigation.move_vel, (0.0, INF, 0.0)),
     (Refused, "0.1", navigation.move_vel, (0.2, 0.0, 0.0)),
     (Refused, "0.06", navigation.move_vel, (0.0, -0.1, 0.0)),
     (Refused, "0.5", navigation.move_vel, (0.0, 0.0, 1.0)),
     (Invalid, "HeadYaw.*LHand", navigation.move_joint, ("Tail", 0.0)),
+    (Invalid, "HeadYaw.*LHand", navigation.move_joint, ("głowa\0", 0.0)),
+    (Invalid, "", navigation.move_joint, ("HeadYaw", 1e308)),
     (Invalid, "HeadYaw", navigation.move_joint, ("HeadYaw", 2.2)),
     (Invalid, "HeadYaw", navigation.move_joint, ("HeadYaw", NAN)),
     (Invalid, "one angle", navigation.move_joint, (["HeadYaw", "HeadPitch"], [0.0])),
@@ -141,6 +146,7 @@ WRONG: list[tuple[type[Exception], str, Callable[..., Any], tuple[Any, ...]]] = 
     (Invalid, "0 torso, 1 world, 2 robot", navigation.get_transform, ("Head", 3)),
     (Invalid, "top, bottom", vision.capture_image, ("left",)),
     (Invalid, "4VGA", vision.capture_image, ("top", 4)),
+    (Invalid, "", vision.capture_image, ("top", 1 << 40)),
     (Invalid, "0 top, 1 bottom", vision.set_camera_param, (2, 0, 1)),
     (Refused, "parameter 99", vision.set_camera_param, (0, 99, 1)),
     (Refused, "0 to 255", vision.set_camera_param, (0, 0, 256)),
@@ -160,7 +166,7 @@ def answer(side: Side, function: Callable[..., Any], args: tuple[Any, ...]) -> t
     return None, ""
 
 
-def test_a_call_of_no_use_is_told_what_would_be_of_use(side: Side) -> None:
+def test_r04_a_call_of_no_use_is_told_what_would_be_of_use(side: Side) -> None:
     surprises = []
     for kind, words, function, args in WRONG:
         found, text = answer(side, function, args)

@@ -64,7 +64,7 @@ def test_nothing_happens(robot: RobotBehindFaults, word: str) -> None:
     robot.served("fine", "fine")
 
 
-def test_a_long_command_that_fits_nothing(robot: RobotBehindFaults) -> None:
+def test_v05_a_long_command_that_fits_nothing(robot: RobotBehindFaults) -> None:
     since = robot.command("the old castle stands on a hill above the town")
     assert robot.refused(since) == NOT_UNDERSTOOD
     assert states(robot, since) == ["s5", "s11", "s3"]
@@ -77,7 +77,7 @@ def asked_which(robot: RobotBehindFaults) -> int:
     return since
 
 
-def test_a_long_command_that_fits_two_is_asked_about_and_the_answer_runs(robot: RobotBehindFaults) -> None:
+def test_v03_a_long_command_that_fits_two_is_asked_about_and_the_answer_runs(robot: RobotBehindFaults) -> None:
     since = asked_which(robot)
     robot.say_until("draughts", entered("s6"), since)
     said = robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "draughts"), since)

@@ -77,6 +77,17 @@ navigation.{call}
 while True:
     self.pause(0.2)"""
 
+PUBLISHES = """import time
+import rospy
+from geometry_msgs.msg import Twist
+wheels = rospy.Publisher("/cmd_vel", Twist, queue_size=10)
+message = Twist()
+message.linear.x = 0.1
+for _ in range(40):
+    wheels.publish(message)
+    self.pause(0.05)"""
+REFUSED = "It has failed"  # so says the robot when the RApp may not even publish
+
 took: dict[str, tuple[float, float]] = {}
 
 
@@ -86,6 +97,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WholeRobot]:
     robot.settings = SETTINGS
     for name, kind in KINDS.items():
         install_rapp(robot.home, name, BODY.format(call=kind.call), keywords=(name.replace("_", " "),), permissions=PERMISSIONS)
+    install_rapp(robot.home, "wheels", PUBLISHES, permissions=PERMISSIONS)
     with whole_robot(robot, "roscore", "nao_sim", "core_agent"):
         yield robot
     print(f"\n{'who, and what it did':40}{'s until still':>15}{'bound':>8}")
@@ -194,6 +206,15 @@ def test_a_rapp_killed_in_the_middle_of_a_motion_leaves_a_still_robot(robot: Who
         until_resting(robot)
     check(f"RApp killed, {name}", watch.went_on(KINDS[name], killed.time), STOPPED)
     robot.until_only_the_spare_runs()
+
+
+def test_r03_a_rapp_that_publishes_velocities_past_the_core_agent_moves_nothing(robot: WholeRobot) -> None:
+    since = len(robot.seen)
+    with watched(robot) as watch:
+        robot.ask("wheels")
+        robot.until_listening(robot.seen.index(robot.until(lambda seen: seen.state == "s10", since)))
+    assert set(robot.said(since)) <= {REFUSED}
+    assert max(walked(watch.moments[0], moment) for moment in watch.moments) < KINDS["move_vel"].noise
 
 
 def test_a_rapp_that_stands_still_in_a_walk_is_stopped(robot: WholeRobot) -> None:

@@ -322,7 +322,7 @@ def test_a_package_older_than_the_installed_one_is_not_fetched(platform: Platfor
     platform.run(test)
 
 
-def test_a_cancelled_installation_leaves_nothing(platform: Platform, tmp_path: Path) -> None:
+def test_v09_a_cancelled_installation_leaves_nothing(platform: Platform, tmp_path: Path) -> None:
     source = source_folder(tmp_path)
     (source / "sound.bin").write_bytes(os.urandom(8_000_000))
     platform.start("--publish", str(source))

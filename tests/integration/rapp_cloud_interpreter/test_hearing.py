@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from rapp_cloud.interpreter.errors import Refused
+from rapp_cloud.interpreter.errors import Invalid, Refused
 from rapp_cloud.interpreter.hearing import interpret_recording, make_interpreter
 
 COMMANDS = {
@@ -75,11 +75,37 @@ def test_sentence_that_fits_two_is_asked_about(interpreter, recording):
     assert sorted(found.choice) == ["letter", "voice_mail"]
 
 
-@pytest.mark.parametrize("level", [0.0, 0.05])
-def test_silence_and_noise_name_none(interpreter, tmp_path, level):
-    file = tmp_path / "noise.wav"
-    soundfile.write(file, level * np.random.default_rng(2).standard_normal(48000), 16000)
+def music(rate):
+    """Three seconds of chords."""
+    time = np.arange(3 * rate) / rate
+    chords = [(262, 330, 392), (294, 349, 440), (247, 294, 392)]
+    parts = np.array_split(time, len(chords))
+    return np.concatenate([sum(0.1 * np.sin(2 * np.pi * f * t) for f in chord) for chord, t in zip(chords, parts, strict=True)])
+
+
+NOT_SPEECH = {
+    "silence": (np.zeros(48000), 16000),
+    "noise": (0.05 * np.random.default_rng(2).standard_normal(48000), 16000),
+    "clipped noise": (np.sign(np.random.default_rng(2).standard_normal(48000)), 16000),
+    "music": (music(16000), 16000),
+    "music in stereo at 48 kHz": (np.stack([music(48000)] * 2, axis=1), 48000),
+}
+
+
+@pytest.mark.parametrize("kind", NOT_SPEECH)
+def test_v01_what_is_no_speech_names_none(interpreter, tmp_path, kind):
+    file = tmp_path / "sound.wav"
+    soundfile.write(file, *NOT_SPEECH[kind])
     assert interpreter.interpret(file, COMMANDS).rapp is None
+
+
+def test_ten_minutes_are_refused_unread(interpreter, tmp_path):
+    file = tmp_path / "sound.ogg"
+    with soundfile.SoundFile(file, "w", 16000, 1, format="OGG", subtype="VORBIS") as sound:
+        for _ in range(60):
+            sound.write(np.zeros(160_000))
+    with pytest.raises(Invalid, match=r"lasts 600 s"):
+        interpreter.interpret(file, COMMANDS)
 
 
 def test_very_short_sound_names_none(interpreter, tmp_path):
@@ -93,7 +119,7 @@ def test_empty_catalogue_names_none(interpreter, recording):
     assert (found.rapp, found.candidates) == (None, ())
 
 
-def test_other_language_is_refused_by_name(interpreter, recording):
+def test_v08_other_language_is_refused_by_name(interpreter, recording):
     with pytest.raises(Refused, match=r"^cannot interpret language 'pl': offered are en"):
         interpreter.interpret(recording("what time is it"), COMMANDS, "pl")
 

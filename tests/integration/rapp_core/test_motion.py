@@ -68,6 +68,11 @@ class Half:
             assert time.monotonic() < deadline, "it did not happen"
             time.sleep(0.05)
 
+    def memory(self) -> int:
+        """Bytes that the half of the core agent has in memory."""
+        pages = Path(f"/proc/{self.process.pid}/statm").read_text().split()[1]
+        return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
     def end_lease(self) -> bool:
         """Gives whether the robot was moved under it."""
         assert self.process.stdin is not None
@@ -236,7 +241,7 @@ tell(client.get_result().success)
     half.until(half.still)
 
 
-def test_a_newer_goal_ends_an_older_one_on_the_same_limbs(half):
+def test_r05_a_newer_goal_ends_an_older_one_on_the_same_limbs(half):
     answers = half.client("""
 walk, posture = navigation.action_client("rapp_move_to"), navigation.action_client("rapp_take_predefined_posture")
 for client in (walk, posture):
@@ -300,6 +305,59 @@ client.wait_for_server(rospy.Duration(10))
 state = client.send_goal_and_wait(MoveJointGoal(joints=["HeadYaw"], angles=[0.2]), rospy.Duration(10))
 print(json.dumps([state, client.get_result().success]))
 """
+
+FLOOD = """
+import json, time, rospy
+from rapp_msgs.msg import MoveToActionGoal
+rospy.init_node("flood", anonymous=True, disable_rosout=True, disable_signals=True)
+publishers = [rospy.Publisher(f"{name}/goal", MoveToActionGoal, queue_size=100_000) for name in ("rapp_move_to",)]
+while not all(publisher.get_num_connections() for publisher in publishers):
+    time.sleep(0.05)
+goal, sent = MoveToActionGoal(), 0
+print("FLOODING", flush=True)
+until = time.monotonic() + 4.0
+while time.monotonic() < until:
+    sent += 1
+    goal.goal_id.id = str(sent)
+    for publisher in publishers:
+        publisher.publish(goal)
+print(sent)
+"""
+
+
+def test_r11_a_flood_of_messages_does_not_keep_the_holder_of_the_lease_from_being_served(half):
+    with subprocess.Popen([sys.executable, "-c", FLOOD], env=half.env, stdout=subprocess.PIPE, text=True) as flood:
+        assert flood.stdout.readline() == "FLOODING\n"
+        answers = half.client("""
+for _ in range(20):
+    navigation.get_transform("Head", 0)
+client = navigation.action_client("rapp_move_joint")
+from rapp_msgs.msg import MoveJointGoal
+tell(client.wait_for_server(rospy.Duration(20)))
+tell(client.send_goal_and_wait(MoveJointGoal(joints=["HeadYaw"], angles=[0.1]), rospy.Duration(20)))
+""").rest()
+        during = flood.poll() is None
+        sent = int(flood.stdout.readline())
+    assert answers == [True, 3]
+    assert during
+    assert sent > 5_000
+    assert half.memory() < 300e6
+    half.client("navigation.move_to(0.05, 0.0, 0.0)").rest()
+
+
+def test_r10_a_fall_ends_a_walk_and_is_named_and_a_low_battery_does_not(half):
+    half.world.setBattery(0.05)
+    client = half.client(WALK)
+    half.until_walking()
+    half.world.pushRobot(0.0, 60.0, 0.3)
+    ((kind, words),) = client.rest()
+    half.world.setBattery(1.0)
+    assert (kind, words) == ("Refused", "cannot walk: the robot has fallen; help it up")
+    assert half.world.hasFallen()
+    assert half.client("tell(outcome(navigation.move_to, 0.1, 0.0, 0.0))").rest() == [[kind, words]]
+    half.client("navigation.take_predefined_posture('StandInit')").rest()
+    assert not half.world.hasFallen()
+
 
 WALKS_AND_IS_KILLED = """
 import os, signal, time

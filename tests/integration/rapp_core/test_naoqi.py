@@ -47,7 +47,7 @@ def test_an_address_that_is_none_is_unreachable(url):
         robot(Connection(url, 1.0), Config()).voice.hush()
 
 
-def test_a_lost_session_is_noticed_and_opened_anew(sim, connect, wait_for):
+def test_r08_a_lost_session_is_noticed_and_opened_anew(sim, connect, wait_for):
     started = sim()
     connection, nao = connect(started)
     nao.voice.say("hello", "en")

@@ -98,7 +98,7 @@ def test_in_lasting_noise_the_robot_still_hears_who_is_louder(world, heard, wait
         world.setNoise(quiet)
 
 
-def test_the_robot_does_not_hear_itself(sounding, world, heard, wait_for):
+def test_v02_the_robot_does_not_hear_itself(sounding, world, heard, wait_for):
     time.sleep(1.0)  # the floor falls after the noise
     heard.clear()
     sounding.service("ALTextToSpeech").say("clock")

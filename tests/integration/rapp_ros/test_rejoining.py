@@ -54,7 +54,7 @@ def survivor(own_master: Any, tmp_path: Path) -> Iterator["subprocess.Popen[str]
         process.communicate()
 
 
-def test_its_service_and_topics_are_there_again_after_a_new_master_has_started(own_master, survivor):
+def test_r01_its_service_and_topics_are_there_again_after_a_new_master_has_started(own_master, survivor):
     assert "hello" in run(ASK, own_master.env)
     own_master.signal(signal.SIGKILL)
     own_master.stop()

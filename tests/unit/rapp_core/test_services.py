@@ -50,7 +50,7 @@ def test_recognise_follows_figure_6(bench: Bench) -> None:
     ]  # fmt: skip
 
 
-def test_a_word_below_the_threshold_is_treated_as_unrecognised(bench: Bench) -> None:
+def test_v04_a_word_below_the_threshold_is_treated_as_unrecognised(bench: Bench) -> None:
     bench.fake.person_says_at(1.0, "Margaret", probability=0.39)
     assert bench.call("rapp_recognize", dictionary=["Margaret"], timeout=3.0)["word"] == "Empty"
     assert bench.clock.time == pytest.approx(3.0, abs=0.1)
@@ -176,6 +176,27 @@ def test_the_end_of_the_lease_ends_a_service_and_tidies_up(bench: Bench, name: s
     assert bench.clock.time < 2.1
     assert bench.fake.body.listener is None
     assert bench.fake.body.recording is None
+
+
+@pytest.mark.parametrize(
+    ("part", "method"), [("recorder", "start"), ("recorder", "energy"), ("ears", "subscribe"), ("voice", "say")]
+)
+def test_r07_a_microphone_that_is_gone_or_a_loudspeaker_that_is_taken_is_told_and_works_when_it_is_back(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, part: str, method: str
+) -> None:
+    def gone(*_args: Any) -> None:
+        raise Refused("cannot do that: the device is away")
+
+    device = {"start": "rapp_record", "energy": "rapp_record_until_silence", "subscribe": "rapp_recognize", "say": "rapp_say"}
+    name = device[method]
+    request_ = {**CALLS, "rapp_record": {"duration": 0.1}, "rapp_say": {"text": "hello", "language": "en"}}[name]
+    with monkeypatch.context() as away:
+        away.setattr(getattr(bench.fake.robot, part), method, gone)
+        with pytest.raises(Refused, match="away"):
+            bench.call(name, **request_)
+    assert bench.fake.body.recording is None
+    assert bench.fake.body.listener is None
+    bench.call(name, **request_)
 
 
 @pytest.mark.parametrize("name", CALLS)

@@ -23,6 +23,7 @@ ACTIONS = {
 SIZES = {0: (160, 120), 1: (320, 240), 2: (640, 480), 3: (1280, 960)}
 FASTEST = {"x": 0.1, "y": 0.06, "theta": 0.5}  # m/s, m/s, rad/s
 FARTHEST = 10.0  # m of one walk
+LARGEST = 3.4e38  # of single precision
 SUCCEEDED, ABORTED = 3, 4  # of actionlib_msgs/GoalStatus
 _SIDES = {
     "ShoulderPitch": (-2.0857, 2.0857), "ElbowYaw": (-2.0857, 2.0857), "WristYaw": (-1.8239, 1.8239), "Hand": (0.0, 1.0),
@@ -250,7 +251,11 @@ def _taken(parameter: int, value: int) -> bool:
 
 
 def _finite(*values: float) -> bool:
-    return all(map(math.isfinite, values))
+    """Whether all are numbers that a message's field of single precision can hold."""
+    try:
+        return all(abs(value) <= LARGEST for value in values)
+    except TypeError:
+        return False
 
 
 def _check(right: bool, what: str) -> None:

@@ -147,7 +147,7 @@ def _translated(name: str) -> Iterator[None]:
     """rospy's errors in our words."""
     try:
         yield
-    except (TypeError, genpy.SerializationError, rospy.ROSSerializationException) as error:
+    except (TypeError, OverflowError, UnicodeError, genpy.SerializationError, rospy.ROSSerializationException) as error:
         raise Invalid(f"cannot call {name}: {error}; give values of the types its description names") from error
     except (rospy.ServiceException, rospy.ROSException, ROSInternalException, OSError) as error:
         refusal = REFUSAL.search(str(error))

@@ -85,6 +85,7 @@ class FakeCoreAgent(FakeBody):
         """Note the text."""
         self._allow("rapp_say", self._core)
         _check(bool(text.strip()) and len(text) <= 4000, "say that: a text of 1 to 4000 characters is needed")
+        _check(not any("\ud800" <= sign <= "\udfff" for sign in text), "say that: half a sign of UTF-16 is no text")
         if language.split("-")[0].lower() not in LANGUAGES:
             raise Refused(f"cannot speak language {language!r}: known are {', '.join(LANGUAGES)}")
         self.calls.append(("say", text))

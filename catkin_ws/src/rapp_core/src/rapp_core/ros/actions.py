@@ -6,6 +6,7 @@ cancel comes. A newer goal ends whatever moves the same limbs.
 
 import logging
 import threading
+import time
 from typing import Any
 
 import rapp_msgs.msg
@@ -23,7 +24,12 @@ from rapp_core.trace import Trace
 
 _log = logging.getLogger(__name__)
 MOST_GOALS = 8  # of one action under way; more than one only while the older make way
+MOST_KNOWN = 40  # goals of one action whose ends are still told on its status topic
+REJECTION = 0.1  # s between two strangers who are told that they are not served; more of them are a flood
 CANCELLED = "cancelled"
+_OVER = (
+    GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.RECALLED, GoalStatus.RECALLING,
+)  # fmt: skip
 
 
 class RosActions:
@@ -43,6 +49,23 @@ class _Action(ActionServer):  # type: ignore[misc]  # actionlib carries no types
         self._lease = lease
         self._trace = trace
         self._calls: dict[str, Call] = {}  # under way, by the goal's id
+        self._next_rejection = 0.0
+
+    def internal_goal_callback(self, goal: Any) -> None:
+        """What comes over the wire; a flood of it neither fills the list of goals nor is answered one by one."""
+        try:
+            self._lease.check(goal._connection_header.get("rapp_channel"))
+        except Refused as error:
+            now = time.monotonic()
+            if now < self._next_rejection:
+                return
+            self._next_rejection = now + REJECTION
+            _log.warning("%s: a goal is refused: %s", self._row.name, error)
+        with self.lock:
+            over = [each for each in self.status_list if each.status.status in _OVER]
+            for each in over[: max(0, len(over) - MOST_KNOWN)]:
+                self.status_list.remove(each)
+            super().internal_goal_callback(goal)
 
     def internal_cancel_callback(self, goal_id: Any) -> None:
         """What comes over the wire is heeded only when it is the lease's holder that cancels."""

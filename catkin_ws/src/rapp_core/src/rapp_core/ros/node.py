@@ -47,9 +47,17 @@ def _enter(name: str, stop: threading.Event, outcome: "queue.SimpleQueue[rospy.R
                 return
     try:
         rospy.init_node(name, disable_signals=True, disable_rosout=True)
+        rospy.on_shutdown(lambda: _ended_from_outside(stop))
         outcome.put(None)
     except rospy.ROSException as error:
         outcome.put(error)
+
+
+def _ended_from_outside(stop: threading.Event) -> None:
+    """The master ends a node when another one comes under its name: without its services this one is of no use any more."""
+    if not stop.is_set():
+        _log.error("cannot go on as %s: another node has taken the name, or has ended this one; see rosnode list", rospy.get_name())
+        stop.set()
 
 
 def leave() -> bool:

@@ -5,7 +5,7 @@ from rapp_core.body_ports import Movement, Pose2D
 from rapp_core.errors import Invalid, Refused
 from rapp_core.geometry import finite
 from rapp_core.services.context import Context, request
-from rapp_core.services.moving import FEELING, Every, motion, refuse_hazard, standing_up
+from rapp_core.services.moving import FEELING, Every, motion, refuse_hazard, refuse_what_ended, standing_up
 
 POSTURE = "StandInit"
 
@@ -56,7 +56,9 @@ def drive_machine(context: Context) -> Machine:
         {
             "look": Behaviour("look", lambda _share: None, label="posture"),
             "stand": standing_up(context),
-            "drive": motion(context, "drive", go, "move", watch, explain=lambda share: refuse_hazard(context, _velocity(share))),
+            "drive": motion(
+                context, "drive", go, "move", watch, explain=lambda share: refuse_what_ended(context, _velocity(share))
+            ),
         },
         "look",
         [Edge("look", "drive", prepared, "StandInit"), Edge("look", "stand"), Edge("stand", "drive")],

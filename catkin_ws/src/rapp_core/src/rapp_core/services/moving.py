@@ -12,6 +12,7 @@ from rapp_core.services.reflexes import hazard
 
 _log = logging.getLogger(__name__)
 TELLING = 0.2  # s between two feedbacks
+FALLING = 1.0  # s that a fall takes at most
 FEELING = 0.05  # s between two looks at what a walking robot feels
 
 Begin = Callable[[Subsystem], Movement]
@@ -104,3 +105,14 @@ def refuse_hazard(context: Context, way: Pose2D) -> None:
     reason = hazard(context.robot.feeling.senses(), way, context.config.near)
     if reason is not None:
         raise Refused(f"cannot walk: {reason}")
+
+
+def refuse_what_ended(context: Context, way: Pose2D) -> None:
+    """Raise Refused with why a robot may have ended a walk by itself; one that falls has not fallen yet when it does so."""
+    until = context.now() + FALLING
+    while True:
+        context.check()
+        refuse_hazard(context, way)
+        if context.now() >= until:
+            return
+        context.cut.wait(FEELING)

@@ -10,7 +10,7 @@ from rapp_core.body_ports import Movement, Pose2D
 from rapp_core.errors import Invalid, Refused
 from rapp_core.geometry import finite, relative, turned
 from rapp_core.services.context import Context, request
-from rapp_core.services.moving import FEELING, Every, motion, refuse_hazard, standing_up
+from rapp_core.services.moving import FEELING, Every, motion, refuse_hazard, refuse_what_ended, standing_up
 from rapp_core.services.place import FRAMES, Waypoint
 
 MOST = 100  # poses of a path
@@ -92,9 +92,9 @@ class _Walk:
 
     def explain(self, _share: Subsystem) -> None:
         """Why a robot may have ended its walk by itself. Raises Refused."""
-        refuse_hazard(self._context, self._way)
+        refuse_what_ended(self._context, self._way)
 
-    def arrive(self, share: Subsystem) -> None:
+    def arrive(self, _share: Subsystem) -> None:
         """Judge where the robot has come to. Raises Refused."""
         self._context.trace.reply("ALMotion", "core", "moveTo")
         config = self._context.config
@@ -102,7 +102,7 @@ class _Walk:
         left = self.left()
         distance = math.hypot(left.x, left.y)
         if distance > config.walk_error or abs(left.theta) > config.turn_error:
-            self.explain(share)
+            refuse_hazard(self._context, self._way)
             off = f"{distance:.2f} m and {abs(left.theta):.2f} rad before the goal"
             raise Refused(f"cannot get there: the robot has stopped {off}; see what is in its way, and try again")
         self._reached += 1
