@@ -13,6 +13,7 @@ from rapp_cloud.accounts import Accounts
 from rapp_cloud.app import open_shelf, running_cloud
 from rapp_cloud.config import CloudConfig, load_config
 from rapp_cloud.files import write_whole
+from rapp_cloud.keys import passphrase_from
 from rapp_cloud.profiles import Profile, Profiles
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
@@ -42,6 +43,7 @@ def _options(words: list[str]) -> CloudConfig:
     parser.add_argument("--address", help="to listen on")
     parser.add_argument("--publish", action="append", metavar="DIR", help="source of a RApp to offer; may be repeated")
     parser.add_argument("--token-file", type=Path, metavar="FILE", help="default: DIR/tokens.json")
+    parser.add_argument("--passphrase-file", type=Path, metavar="FILE", help="of the store's keys; default: beside them")
     parser.add_argument("--workers", type=int, help="processes for interpretation")
     options = vars(parser.parse_args(words))
     return load_config(options.pop("data"), options, os.environ)
@@ -64,8 +66,10 @@ def _init(words: list[str]) -> int:
     options = parser.parse_args(words)
     data, robot = options.data, check_name(options.robot)
     data.mkdir(parents=True, exist_ok=True, mode=0o700)
-    shelf = open_shelf(data)
-    if not shelf.root_file.exists():
+    shelf = open_shelf(data, passphrase_from(os.environ))
+    if shelf.root_file.exists():
+        shelf.adopt()
+    else:
         shelf.create()
     write_whole(data / "root.json", shelf.root_file.read_bytes())
     token_file = data / "robots" / f"{robot}.token"
@@ -84,7 +88,7 @@ def _publish(words: list[str]) -> int:
     parser.add_argument("sources", nargs="+", type=Path, metavar="FOLDER")
     options = parser.parse_args(words)
     for folder in options.sources:
-        manifest = open_shelf(options.data).publish(build(folder))
+        manifest = open_shelf(options.data, passphrase_from(os.environ)).publish(build(folder))
         print(f"on offer: {manifest.name} {manifest.version}")
     return 0
 

@@ -16,6 +16,7 @@ from rapp_cloud.cloud_agents.engine import LocalProcesses
 from rapp_cloud.cloud_agents.packages import Packages
 from rapp_cloud.config import CloudConfig
 from rapp_cloud.interpreter.port import Commands, Interpretation, Interpreter
+from rapp_cloud.keys import Passphrase
 from rapp_cloud.profiles import Profiles
 from rapp_cloud.reports import Reports
 from rapp_cloud.robots import Robots
@@ -36,9 +37,9 @@ from rapp_hop.workers import Workers
 _log = logging.getLogger(__name__)
 
 
-def open_shelf(data: Path) -> Shelf:
+def open_shelf(data: Path, passphrase: Passphrase | None = None) -> Shelf:
     """Return the store of a data folder."""
-    return Shelf(data / "tuf", data / "keys")
+    return Shelf(data / "tuf", data / "keys", passphrase=passphrase)
 
 
 def load_interpreter() -> Interpreter:
@@ -54,7 +55,7 @@ async def running_cloud(config: CloudConfig) -> AsyncIterator[int]:
 
     :raises HopError: when the store, a source to publish or the port is not as it must be
     """
-    shelf = open_shelf(config.data)
+    shelf = open_shelf(config.data, Passphrase(config.passphrase, config.passphrase_file))
     await asyncio.to_thread(_prepare, shelf, config)
     workers, robots = Workers(load_interpreter, config.workers), Robots(time.monotonic, config.lease)
     doors = Doors(config.data / "agents", config.data / "uploads", Accounts(config.tokens).robot_of)

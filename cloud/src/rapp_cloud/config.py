@@ -3,7 +3,7 @@
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,10 @@ from rapp_hop.errors import Invalid
 
 FILE = "cloud.toml"
 PREFIX = "RAPP_CLOUD_"
+_TYPES: dict[str, type[Any]] = {
+    "address": str, "passphrase": str, "port": int, "workers": int, "agents": int, "agents_of_one": int,
+    "token_file": Path, "passphrase_file": Path,
+}  # fmt: skip  # others: float
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,8 @@ class CloudConfig:
     address: str = "127.0.0.1"  # to listen on
     port: int = 9001  # 0: any free one
     token_file: Path | None = None  # None: <data>/tokens.json
+    passphrase: str | None = field(default=None, repr=False)  # of the store's keys; only from the environment
+    passphrase_file: Path | None = None  # the same out of a file; neither: beside the keys
     publish: tuple[Path, ...] = ()  # sources of RApps to offer at start
     workers: int = os.cpu_count() or 1  # processes for interpretation
     interpret_timeout: float = 30.0  # seconds for one sentence
@@ -64,8 +70,7 @@ def _typed(name: str, value: Any) -> Any:
         if not isinstance(value, list):
             raise Invalid("cannot use the setting publish: it must be a list of folders")
         return tuple(Path(item) for item in value)
-    whole = dict.fromkeys(("port", "workers", "agents", "agents_of_one"), int)
-    kind: type[Any] = {"address": str, "token_file": Path, **whole}.get(name, float)
+    kind = _TYPES.get(name, float)
     try:
         found = kind(value)
     except (TypeError, ValueError):

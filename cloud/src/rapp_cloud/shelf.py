@@ -1,60 +1,61 @@
 """The store's shelf: RApp packages as targets of a TUF repository, signed here, served as plain files.
 
-Folders: `metadata/` and `targets/`, which robots see. Order of a publication: package, targets, snapshot, and the
-timestamp last, so that a robot sees the old state or the new one. All writes happen under a lock, for
-`rapp_cloud publish` may run beside the server. Blocking.
-
-TUF: roles root, targets, snapshot, timestamp with a key each, threshold one, consistent snapshots. Delegation to
-publishers and the life of keys come with the store's own issue.
+Folders: `metadata/` and `targets/`, which robots see. All writes happen under a lock, for `rapp_cloud publish` may run
+beside the server. Blocking. Who signs what: `ledger`, `custody`, `keys`.
 """
 
-import fcntl
 import hashlib
 import io
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+import logging
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
-from securesystemslib.signer import Signer
 from tuf.api.exceptions import RepositoryError
-from tuf.api.metadata import (  # type: ignore[attr-defined]  # public, but not in __all__
-    Metadata,
-    MetaFile,
-    Root,
-    Snapshot,
-    TargetFile,
-    Targets,
-    Timestamp,
-)
+from tuf.api.metadata import TargetFile, Targets  # type: ignore[attr-defined]  # public, but not in __all__
 
+from rapp_cloud.custody import Custody, add_publisher, delegated, owner_of, pattern
 from rapp_cloud.files import write_whole
-from rapp_cloud.keys import ROLES, load_keys, make_keys
-from rapp_hop.errors import Bug, Invalid, Refused, Unreachable
+from rapp_cloud.keys import ROLES, KeyRing, Passphrase
+from rapp_cloud.ledger import Expiry, Ledger, Lists
+from rapp_hop.errors import Bug, Invalid, Refused
 from rapp_hop.hz.archive import Contents, extract, inspect, package_file_name
 from rapp_hop.hz.manifest import Manifest
 from rapp_hop.hz.tar import Limits
+from rapp_hop.hz.trust import YANKED
 
-_LOCK_PATIENCE = 10.0  # seconds
+__all__ = ["Expiry", "Offer", "Shelf"]
+
+PUBLISHER = "rapp"  # who publishes where nobody else is named
+Check = Callable[[Manifest, list[Manifest]], None]  # of a package against those on offer; raises what is wrong
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Expiry:
-    """How long each role's word is good."""
+class Offer:
+    """A package on the shelf."""
 
-    root: timedelta = timedelta(days=365)
-    targets: timedelta = timedelta(days=90)
-    snapshot: timedelta = timedelta(days=90)
-    timestamp: timedelta = timedelta(days=1)
+    manifest: Manifest
+    publisher: str
+    length: int  # bytes
+    sha256: str
+    robots: tuple[str, ...]  # names of those it is for; none: all
+    yanked: bool = False
 
 
 class Shelf:
     """The store's packages; make it once with `create`, then open it."""
 
-    def __init__(self, folder: Path, keys: Path, expiry: Expiry | None = None, limits: Limits | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        keys: Path,
+        expiry: Expiry | None = None,
+        limits: Limits | None = None,
+        passphrase: Passphrase | None = None,
+    ) -> None:
         """Remember the places; reads nothing yet.
 
         :param folder: holds metadata/ and targets/
@@ -62,10 +63,11 @@ class Shelf:
         """
         self.metadata = folder / "metadata"
         self.targets = folder / "targets"
-        self._keys = keys
-        self._expiry = expiry or Expiry()
+        self._keys = KeyRing(keys, passphrase)
+        self._ledger = Ledger(self.metadata, self._keys, expiry)
         self._limits = limits or Limits()
-        self._manifests: dict[str, Manifest] = {}  # by target path: a target never changes
+        self._manifests: dict[str, Manifest] = {}  # by hash and path: a package never changes
+        self.custody = Custody(self._ledger)
 
     @property
     def root_file(self) -> Path:
@@ -73,71 +75,117 @@ class Shelf:
         return self.metadata / "1.root.json"
 
     def create(self) -> None:
-        """Make keys and an empty, signed repository.
+        """Make keys and an empty, signed repository with one publisher.
 
         :raises Refused: when there is one already
         """
         if self.root_file.exists():
             raise Refused(f"cannot make a store in {self.metadata.parent}: there is one")
+        if self._keys.names():
+            raise Refused(f"cannot make keys in {self._keys.folder}: there are some, keep them")
         for folder in (self.metadata, self.targets):
             folder.mkdir(parents=True, exist_ok=True)
-        signers = make_keys(self._keys)
-        root = Root(consistent_snapshot=True, expires=_from_now(self._expiry.root))
-        for role in ROLES:
-            root.add_key(signers[role].public_key, role)
-        self._sign(root, "root", signers, f"{root.version}.root.json")
-        with self._locked():
-            self._publish(Targets(), Snapshot(), Timestamp(), signers)
+        signers = {role: self._keys.new(role) for role in ROLES}
+        for role, signer in signers.items():
+            self._keys.keep(role, signer)
+        with self._ledger.locked():
+            lists = self._ledger.create(signers)
+            add_publisher(self._ledger, lists, PUBLISHER)
+            self._ledger.write(lists, ["targets", PUBLISHER])
 
-    def publish(self, package: bytes) -> Manifest:
-        """Check a package, sign for it and offer it.
+    def adopt(self) -> None:
+        """Bring a store of an earlier version to this one: keys locked, packages with a publisher of their own."""
+        with self._ledger.locked():
+            for name in self._keys.encrypt_all():
+                _log.info("the key of %s is encrypted now", name)
+            lists = self._ledger.read()
+            if delegated(lists) or self.custody.holders()[len(ROLES) :]:
+                return
+            own = add_publisher(self._ledger, lists, PUBLISHER)
+            own.targets, lists.targets.targets = lists.targets.targets, {}
+            names = sorted({str(target.custom["name"]) for target in own.targets.values()})
+            delegated(lists)[PUBLISHER].paths = [pattern(name) for name in names]
+            self._ledger.write(lists, ["targets", PUBLISHER])
 
-        The same bytes again change nothing.
+    def publish(
+        self, package: bytes, publisher: str | None = None, robots: tuple[str, ...] = (), check: Check | None = None
+    ) -> Manifest:
+        """Check a package, sign for it as its publisher and offer it. The same bytes again change nothing.
 
+        :param publisher: None: whose name it is, or `PUBLISHER`
+        :param robots: names of the only robots it is for; none: all
+        :param check: what else must hold beside the packages on offer
         :raises Invalid: when it is not a right package
-        :raises Refused: when this version was published with other bytes (S20)
+        :raises Refused: when this version was published with other bytes (S20), or the name is another's
         """
-        manifest = inspect(io.BytesIO(package), self._limits).manifest
+        contents = inspect(io.BytesIO(package), self._limits)
+        manifest = contents.manifest
+        if not contents.for_hop:
+            raise Invalid(f"cannot publish {manifest.name}: it has no etc/weblet.info, build it with ./rapp hz build")
         path = package_file_name(manifest.name, manifest.version.text)
-        with self._locked():
-            timestamp, snapshot, targets = self._state()
-            there = targets.targets.get(path)
-            digest = hashlib.sha256(package).hexdigest()
-            if there is not None:
-                if there.hashes["sha256"] != digest:
-                    raise Refused(f"cannot publish {path}: published with other bytes before, raise its version")
+        digest = hashlib.sha256(package).hexdigest()
+        with self._ledger.locked():
+            lists = self._ledger.read()
+            publisher, own, changed = _desk(lists, manifest.name, publisher)
+            if _known(own, path) not in (None, digest):
+                raise Refused(f"cannot publish {path}: published with other bytes before, raise its version")
+            if path in own.targets:
                 return manifest
+            if check is not None:
+                check(manifest, [offer.manifest for offer in self._offers(lists)])
             target = TargetFile.from_data(path, package, ["sha256"])
-            target.unrecognized_fields["custom"] = {"name": manifest.name, "version": manifest.version.text}
-            targets.targets[path] = target
+            target.unrecognized_fields["custom"] = _custom(manifest, robots)
+            own.targets[path] = target
+            own.unrecognized_fields.get(YANKED, {}).pop(path, None)
             write_whole(self.targets / f"{digest}.{path}", package)
-            targets.version += 1
-            snapshot.version += 1
-            timestamp.version += 1
-            self._publish(targets, snapshot, timestamp, load_keys(self._keys))
+            self._ledger.write(lists, [publisher, *changed])
         return manifest
 
+    def yank(self, name: str, version: str) -> None:
+        """Take a version off offer; robots that have it keep it, and may go back behind it.
+
+        :raises Refused: when it is not on offer
+        """
+        path = package_file_name(name, version)
+        with self._ledger.locked():
+            lists = self._ledger.read()
+            publisher = owner_of(lists, name)
+            own = lists.publishers[publisher] if publisher else Targets()
+            if publisher is None or path not in own.targets:
+                raise Refused(f"cannot yank {name} {version}: it is not on offer, see ./rapp store list")
+            gone = own.targets.pop(path)
+            own.unrecognized_fields.setdefault(YANKED, {})[path] = gone.hashes["sha256"]
+            self._ledger.write(lists, [publisher])
+
     def refresh(self) -> None:
-        """Sign a new timestamp, and snapshot and targets too when half of their time is over."""
-        with self._locked():
-            timestamp, snapshot, targets = self._state()
-            half = datetime.now(UTC) + min(self._expiry.targets, self._expiry.snapshot) / 2
-            if targets.expires < half or snapshot.expires < half:
-                targets.version += 1
-                snapshot.version += 1
-            timestamp.version += 1
-            self._publish(targets, snapshot, timestamp, load_keys(self._keys))
+        """Sign a new timestamp, and other lists and root when half of their time is over and their key is here."""
+        with self._ledger.locked():
+            lists = self._ledger.read()
+            if lists.root.expires < datetime.now(UTC) + self._ledger.expiry.root / 2:
+                self._renew_root(lists)
+            due = []
+            for name in self._ledger.overdue(lists):
+                try:
+                    self._ledger.signer(lists, name)
+                    due.append(name)
+                except Refused as error:
+                    _log.warning("%s: its list runs out", error)
+            self._ledger.write(lists, due)
 
     def manifests(self) -> list[Manifest]:
         """Return the manifests of all packages on offer; each package is read once.
 
         :raises Bug: when a package is gone or was changed behind our back
         """
-        targets = self._state()[2].targets
-        for path, target in targets.items():
-            if path not in self._manifests:
-                self._manifests[path] = self._manifest(target)
-        return [self._manifests[path] for path in sorted(targets)]
+        return [offer.manifest for offer in self.offers()]
+
+    def offers(self, *, yanked: bool = False) -> list[Offer]:
+        """Return all packages on offer, and those taken off it when wanted; see `manifests`."""
+        lists = self._ledger.read()
+        found = list(self._offers(lists))
+        if yanked:
+            found += self._yanked(lists)
+        return sorted(found, key=lambda offer: (offer.manifest.name, offer.manifest.version.key))
 
     def unpack(self, name: str, version: str, folder: Path) -> None:
         """Unpack a package on offer into a new folder.
@@ -145,13 +193,39 @@ class Shelf:
         :raises Refused: there is none of that name and version
         :raises Bug: as for `manifests`
         """
-        target = self._state()[2].targets.get(package_file_name(name, version))
-        if target is None:
-            raise Refused(f"cannot find {name} {version}: it is not in the store")
-        self._read(target, lambda file: extract(file, folder, self._limits))
+        path = package_file_name(name, version)
+        for targets in self._ledger.read().publishers.values():
+            if path in targets.targets:
+                self._read(targets.targets[path], lambda file: extract(file, folder, self._limits))
+                return
+        raise Refused(f"cannot find {name} {version}: it is not in the store")
+
+    def file_of(self, name: str) -> tuple[Path, int] | None:
+        """Return where a package on offer lies and its length (bytes), by its file name; None: not on offer."""
+        for targets in self._ledger.read().publishers.values():
+            if name in targets.targets:
+                target = targets.targets[name]
+                return self.targets / f"{target.hashes['sha256']}.{name}", target.length
+        return None
+
+    def _offers(self, lists: Lists) -> Iterator[Offer]:
+        for publisher, targets in [(PUBLISHER, lists.targets), *lists.publishers.items()]:
+            for target in targets.targets.values():
+                robots = tuple((target.custom or {}).get("robots", ()))
+                yield Offer(self._manifest(target), publisher, target.length, target.hashes["sha256"], robots)
+
+    def _yanked(self, lists: Lists) -> Iterator[Offer]:
+        for publisher, targets in lists.publishers.items():
+            for path, digest in targets.unrecognized_fields.get(YANKED, {}).items():
+                length = (self.targets / f"{digest}.{path}").stat().st_size
+                target = TargetFile(length, {"sha256": digest}, path)
+                yield Offer(self._manifest(target), publisher, length, digest, (), yanked=True)
 
     def _manifest(self, target: TargetFile) -> Manifest:
-        return self._read(target, lambda file: inspect(file, self._limits)).manifest
+        key = f"{target.hashes['sha256']}.{target.path}"
+        if key not in self._manifests:
+            self._manifests[key] = self._read(target, lambda file: inspect(file, self._limits)).manifest
+        return self._manifests[key]
 
     def _read(self, target: TargetFile, read: Callable[[BinaryIO], Contents]) -> Contents:
         try:
@@ -162,55 +236,37 @@ class Shelf:
         except (OSError, RepositoryError, Invalid) as error:
             raise Bug(f"cannot read {target.path} on the shelf: {error}, restore it from a backup") from None
 
-    def _state(self) -> tuple[Timestamp, Snapshot, Targets]:
-        """Return what is on offer now, as copies that may be changed."""
+    def _renew_root(self, lists: Lists) -> None:
         try:
-            timestamp = Metadata[Timestamp].from_bytes((self.metadata / "timestamp.json").read_bytes()).signed
-            version = timestamp.snapshot_meta.version
-            snapshot = Metadata[Snapshot].from_bytes((self.metadata / f"{version}.snapshot.json").read_bytes()).signed
-            version = snapshot.meta["targets.json"].version
-            targets = Metadata[Targets].from_bytes((self.metadata / f"{version}.targets.json").read_bytes()).signed
-        except (OSError, RepositoryError, KeyError) as error:
-            raise Refused(f"cannot read the store in {self.metadata.parent}: {error}, run rapp_cloud init") from None
-        return timestamp, snapshot, targets
-
-    def _publish(self, targets: Targets, snapshot: Snapshot, timestamp: Timestamp, signers: Mapping[str, Signer]) -> None:
-        targets.expires = _from_now(self._expiry.targets)
-        snapshot.expires = _from_now(self._expiry.snapshot)
-        timestamp.expires = _from_now(self._expiry.timestamp)
-        name = f"{targets.version}.targets.json"
-        if snapshot.meta["targets.json"].version != targets.version or not (self.metadata / name).exists():
-            data = self._sign(targets, "targets", signers, name)
-            snapshot.meta["targets.json"] = MetaFile.from_data(targets.version, data, ["sha256"])
-        name = f"{snapshot.version}.snapshot.json"
-        if timestamp.snapshot_meta.version != snapshot.version or not (self.metadata / name).exists():
-            data = self._sign(snapshot, "snapshot", signers, name)
-            timestamp.snapshot_meta = MetaFile.from_data(snapshot.version, data, ["sha256"])
-        self._sign(timestamp, "timestamp", signers, "timestamp.json")
-
-    def _sign(
-        self, signed: Root | Timestamp | Snapshot | Targets, role: str, signers: Mapping[str, Signer], file_name: str
-    ) -> bytes:
-        metadata: Metadata[Any] = Metadata(signed)
-        metadata.sign(signers[role])
-        data = metadata.to_bytes()
-        write_whole(self.metadata / file_name, data)
-        return data
-
-    @contextmanager
-    def _locked(self) -> Iterator[None]:
-        end = time.monotonic() + _LOCK_PATIENCE
-        with (self.metadata.parent / ".lock").open("w") as lock:
-            while True:
-                try:
-                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    break
-                except BlockingIOError:
-                    if time.monotonic() > end:
-                        raise Unreachable("cannot change the store now: somebody else does, try again") from None
-                    time.sleep(0.02)
-            yield
+            signer = self._ledger.signer(lists, "root")
+        except Refused as error:
+            _log.warning("%s: it runs out at %s", error, lists.root.expires)
+            return
+        lists.root.version += 1
+        self._ledger.write_root(lists.root, [signer])
 
 
-def _from_now(span: timedelta) -> datetime:
-    return (datetime.now(UTC) + span).replace(microsecond=0)
+def _desk(lists: Lists, name: str, publisher: str | None) -> tuple[str, Targets, list[str]]:
+    """Return who publishes a package, their list, and "targets" when the name is theirs only from now on."""
+    owner = owner_of(lists, name)
+    publisher = publisher or owner or PUBLISHER
+    if owner is not None and owner != publisher:
+        raise Refused(f"cannot publish {name} as {publisher}: the name is {owner}'s, choose another")
+    if publisher not in lists.publishers:
+        raise Refused(f"cannot publish as {publisher}: there is no such publisher, make one with ./rapp keys new {publisher}")
+    if owner is None:
+        role = delegated(lists)[publisher]
+        role.paths = [*(role.paths or ()), pattern(name)]
+    return publisher, lists.publishers[publisher], [] if owner else ["targets"]
+
+
+def _known(own: Targets, path: str) -> str | None:
+    if path in own.targets:
+        return own.targets[path].hashes["sha256"]
+    found: str | None = own.unrecognized_fields.get(YANKED, {}).get(path)
+    return found
+
+
+def _custom(manifest: Manifest, robots: tuple[str, ...]) -> dict[str, object]:
+    custom: dict[str, object] = {"name": manifest.name, "version": manifest.version.text}
+    return {**custom, "robots": list(robots)} if robots else custom

@@ -9,6 +9,7 @@ from typing import Any
 
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Bug, HopError, Invalid, Refused, Unreachable
+from rapp_hop.hz.delivery import Recipient
 from rapp_link.config import Config
 from rapp_link.disk import Disk, replace_whole
 from rapp_link.reports import Reports
@@ -53,6 +54,12 @@ class Platform:
         if self._identity is None:
             raise Refused("cannot ask the platform before the robot is registered: call register first")
         return self._identity.robot
+
+    @property
+    def recipient(self) -> Recipient | None:
+        """What packages must fit, as far as the core has said it."""
+        found = self._identity
+        return Recipient(found.robot, found.kind, found.api_version) if found else None
 
     async def register(self, identity: Identity, patience: float) -> dict[str, Any]:
         """Register now, and keep trying in the background when the platform is away.

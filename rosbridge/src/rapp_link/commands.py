@@ -109,7 +109,7 @@ class Commands:
             whole = details.get("of", 0)
             ticket.progress(phase, details.get("bytes", 0) / whole if whole else 1.0)
 
-        done = await self._store().install(name, on_phase=on_phase)
+        done = await self._store().install(name, None, on_phase, self._platform.recipient)
         return {"name": done.name, "version": done.version, "path": str(done.path), "installed": done.new}
 
     async def remove(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:

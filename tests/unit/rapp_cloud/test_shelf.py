@@ -7,26 +7,11 @@ import pytest
 from tuf.api.metadata import Metadata
 
 from fakes.packages import source_folder
+from fakes.store_folder import StoreFolder
 from rapp_cloud.shelf import Expiry, Shelf
 from rapp_hop.errors import Bug, Invalid, Refused
 from rapp_hop.hz.archive import build
-from rapp_hop.hz.trust import Attack, TrustedStore, Untrusted, newest
-from rapp_hop.streaming import Progress, Writer
-
-
-class Folder:
-    """The port `Transport` straight from the shelf's folder."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None) -> None:
-        path = self._folder / url.removeprefix("store:/")
-        if not path.exists():
-            raise Refused("cannot fetch it", 404)
-        data = path.read_bytes()
-        assert len(data) <= limit
-        write(data)
+from rapp_hop.hz.trust import Attack, TrustedStore, Untrusted, choose
 
 
 @pytest.fixture
@@ -38,11 +23,15 @@ def shelf(tmp_path: Path) -> Shelf:
 
 @pytest.fixture
 def robot(shelf: Shelf, tmp_path: Path) -> TrustedStore:
-    return TrustedStore(Folder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "trust")
+    return TrustedStore(StoreFolder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "trust")
 
 
 def package(folder: Path, name: str = "hello", version: str = "1.0.0", program: str = "pass\n") -> bytes:
     return build(source_folder(folder / program.strip(), name, version, program))
+
+
+def offered(robot: TrustedStore, name: str = "hello") -> list[str]:
+    return [release.version.text for release in robot.versions(name).releases]
 
 
 def version_of(path: Path) -> int:
@@ -52,7 +41,10 @@ def version_of(path: Path) -> int:
 def test_keys_are_private(shelf: Shelf, tmp_path: Path) -> None:
     assert (tmp_path / "keys").stat().st_mode & 0o777 == 0o700
     files = list((tmp_path / "keys").iterdir())
-    assert len(files) == 4
+    assert sorted(path.name for path in files) == sorted(
+        ["passphrase", "rapp.pem", "root.pem", "snapshot.pem", "targets.pem", "timestamp.pem"]
+    )
+    assert all(path.read_bytes().startswith(b"-----BEGIN ENCRYPTED") for path in files if path.suffix == ".pem")
     assert {path.stat().st_mode & 0o777 for path in files} == {0o600}
     assert not any(b"PRIVATE" in path.read_bytes() for path in (tmp_path / "tuf").rglob("*.json"))
 
@@ -60,7 +52,7 @@ def test_keys_are_private(shelf: Shelf, tmp_path: Path) -> None:
 def test_what_is_published_arrives_verified(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
     data = package(tmp_path)
     assert shelf.publish(data).name == "hello"
-    release = newest(robot.releases(), "hello")
+    release = choose(robot.versions("hello"), "hello")
     robot.download(release, tmp_path / "got.hz")
     assert (tmp_path / "got.hz").read_bytes() == data
     assert release.target.custom == {"name": "hello", "version": "1.0.0"}
@@ -86,30 +78,30 @@ def test_s20_the_same_version_with_other_bytes(shelf: Shelf, robot: TrustedStore
     assert version_of(shelf.metadata / "timestamp.json") == before
     with pytest.raises(Refused, match="raise its version"):
         shelf.publish(package(tmp_path, program="evil()\n"))
-    assert len(robot.releases()) == 1
+    assert len(offered(robot)) == 1
 
 
 def test_two_versions_stay_on_offer(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
     shelf.publish(package(tmp_path))
     shelf.publish(package(tmp_path, version="1.0.1"))
-    assert [release.version.text for release in robot.releases()] == ["1.0.0", "1.0.1"]
+    assert offered(robot) == ["1.0.0", "1.0.1"]
 
 
 def test_a_wrong_package_is_not_published(shelf: Shelf, robot: TrustedStore) -> None:
     with pytest.raises(Invalid):
         shelf.publish(b"<html>")
-    assert robot.releases() == []
+    assert offered(robot) == []
 
 
 def test_refresh_signs_a_new_timestamp_only(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
     shelf.publish(package(tmp_path))
-    robot.releases()
+    robot.versions("hello")
     targets = sorted(shelf.metadata.glob("*.targets.json"))
     before = version_of(shelf.metadata / "timestamp.json")
     shelf.refresh()
     assert version_of(shelf.metadata / "timestamp.json") == before + 1
     assert sorted(shelf.metadata.glob("*.targets.json")) == targets
-    assert len(robot.releases()) == 1
+    assert len(offered(robot)) == 1
 
 
 def test_refresh_signs_everything_whose_time_is_half_over(tmp_path: Path) -> None:
@@ -124,9 +116,9 @@ def test_refresh_signs_everything_whose_time_is_half_over(tmp_path: Path) -> Non
 def test_s04_a_store_that_nobody_refreshes_is_not_believed(tmp_path: Path) -> None:
     shelf = Shelf(tmp_path / "tuf", tmp_path / "keys", Expiry(timestamp=timedelta(seconds=-1)))
     shelf.create()
-    robot = TrustedStore(Folder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "trust")
+    robot = TrustedStore(StoreFolder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "trust")
     with pytest.raises(Untrusted) as caught:
-        robot.releases()
+        robot.versions("hello")
     assert caught.value.attack == Attack.FREEZE
 
 
@@ -141,7 +133,7 @@ def test_create_twice_keeps_the_keys(shelf: Shelf, tmp_path: Path) -> None:
 
 
 def test_keys_that_others_can_read_are_not_used(shelf: Shelf, tmp_path: Path) -> None:
-    (tmp_path / "keys" / "targets.pem").chmod(0o644)
+    (tmp_path / "keys" / "timestamp.pem").chmod(0o644)
     with pytest.raises(Refused, match="0600"):
         shelf.refresh()
 
@@ -165,6 +157,6 @@ def test_a_publication_cut_short_before_the_timestamp_changes_nothing_and_can_be
     before = (shelf.metadata / "timestamp.json").read_bytes()
     shelf.publish(package(tmp_path))
     (shelf.metadata / "timestamp.json").write_bytes(before)  # power went before the last rename
-    assert robot.releases() == []
+    assert offered(robot) == []
     shelf.publish(package(tmp_path / "again"))
-    assert [release.name for release in robot.releases()] == ["hello"]
+    assert offered(robot) == ["1.0.0"]

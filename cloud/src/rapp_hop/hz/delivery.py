@@ -17,10 +17,10 @@ from typing import Any
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Refused, Unreachable
 from rapp_hop.hz.install import Installed, PackageFile, RappFolder, install
-from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.manifest import Manifest, reasons_against
 from rapp_hop.hz.semver import parse_version
 from rapp_hop.hz.tar import Limits
-from rapp_hop.hz.trust import Attack, Release, TrustedStore, Untrusted, newest
+from rapp_hop.hz.trust import Attack, Release, TrustedStore, Untrusted, Versions, choose
 from rapp_hop.streaming import Progress, Writer
 
 OnPhase = Callable[[str, dict[str, Any]], None]  # "downloading" | "verified" | "installed", and details
@@ -33,7 +33,18 @@ class DeliveryLimits:
 
     metadata_timeout: float = 10.0  # seconds per metadata file
     package_timeout: float = 120.0  # seconds per package
+    slowest: float = 1024.0  # bytes per second on average over each `window`; less is slow retrieval
+    window: float = 5.0  # seconds
     package: Limits = field(default_factory=Limits)
+
+
+@dataclass(frozen=True)
+class Recipient:
+    """The robot that a package is for."""
+
+    name: str
+    kind: str
+    api_version: str  # of its core agent
 
 
 class Delivery:
@@ -53,16 +64,19 @@ class Delivery:
         self.folder = RappFolder(home / "rapps")
         self._one = asyncio.Lock()  # what was seen of the store has one writer
 
-    async def install(self, name: str, version: str | None = None, on_phase: OnPhase | None = None) -> Installed:
+    async def install(
+        self, name: str, version: str | None = None, on_phase: OnPhase | None = None, robot: Recipient | None = None
+    ) -> Installed:
         """Install a RApp, the newest version when none is named; one that is there already is not fetched again.
 
         Cancelling ends the download and waits for the thread, so that nothing half done goes on.
 
         :param on_phase: called in this loop
+        :param robot: what cannot run there, or is not for it, is refused
         :raises Untrusted: the store cannot be believed (`.attack` says why)
         :raises Invalid: the package is not right
-        :raises Refused: no such RApp, or the disk is unwilling
-        :raises Unreachable: try again later
+        :raises Refused: no such RApp, not for this robot, or the disk is unwilling
+        :raises Unreachable: try again later; `reason` says when it came too slowly
         """
         loop = asyncio.get_running_loop()
         transport = _LoopTransport(self._client, loop, self._limits)
@@ -72,7 +86,7 @@ class Delivery:
                 loop.call_soon_threadsafe(on_phase, phase, details)
 
         async with self._one:
-            work = asyncio.ensure_future(asyncio.to_thread(self._install, transport, name, version, tell))
+            work = asyncio.ensure_future(asyncio.to_thread(self._install, transport, _Wish(name, version, robot), tell))
             try:
                 return await asyncio.shield(work)
             except asyncio.CancelledError:
@@ -89,36 +103,42 @@ class Delivery:
         """Return the manifests of the installed RApps by name."""
         return await asyncio.to_thread(self.folder.list)
 
-    def _install(self, transport: "_LoopTransport", name: str, version: str | None, tell: _Tell) -> Installed:
+    def _install(self, transport: "_LoopTransport", wish: "_Wish", tell: _Tell) -> Installed:
         store = TrustedStore(transport, f"{self._client.base_url}/tuf", self._root, self._home / "trust", self._limits.package)
         try:
-            release = newest(store.releases(), name, version)
-            present = self.folder.find(name, release.version.text)
-            if present is not None and self.folder.find(name) == present:
+            offered = store.versions(wish.name)
+            release = choose(offered, wish.name, wish.version, wish.robot.name if wish.robot else None)
+            present = self.folder.find(wish.name, release.version.text)
+            if present is not None and self.folder.find(wish.name) == present:
                 return present
-            if version is None:
-                self._check_not_older(release)
+            if wish.version is None:
+                self._check_not_older(release, offered)
             aside = self._new_file()
             try:
-                return self._fetch(store, release, aside, tell)
+                return self._fetch(store, release, aside, wish, tell)
             finally:
                 aside.unlink(missing_ok=True)
         except OSError as error:
-            raise Refused(f"cannot install {name}: {error.strerror}, check the disk") from None
+            raise Refused(f"cannot install {wish.name}: {error.strerror}, check the disk") from None
 
-    def _check_not_older(self, release: Release) -> None:
-        """Refuse to go back behind what is installed: a version that was mended must not come back by itself."""
+    def _check_not_older(self, release: Release, offered: Versions) -> None:
+        """Refuse to go back behind what is installed, unless its publisher took that off offer.
+
+        A version that was mended must not come back by itself.
+        """
         there = self.folder.find(release.name)
-        if there is not None and release.version.key < parse_version(there.version).key:
+        if there is None or there.version in offered.yanked:
+            return
+        if release.version.key < parse_version(there.version).key:
             older = f"cannot install {release.name} {release.version.text}: {there.version} is installed"
             raise Untrusted(Attack.ROLLBACK, f"{older}; remove it first if the older one is wanted")
 
-    def _fetch(self, store: TrustedStore, release: Release, aside: Path, tell: _Tell) -> Installed:
+    def _fetch(self, store: TrustedStore, release: Release, aside: Path, wish: "_Wish", tell: _Tell) -> Installed:
         name, version = release.name, release.version.text
         tell("downloading", version=version, bytes=0, of=release.length)
         store.download(release, aside, lambda count, _: tell("downloading", bytes=count, of=release.length))
         tell("verified", version=version)
-        done = install(PackageFile(aside, name, version, self._limits.package), self.folder)
+        done = install(PackageFile(aside, name, version, self._limits.package, wish.check), self.folder)
         tell("installed", version=done.version, path=str(done.path))
         return done
 
@@ -131,6 +151,21 @@ class Delivery:
             if path.stat().st_mtime < too_old:
                 path.unlink(missing_ok=True)
         return folder / f"{secrets.token_hex(8)}.hz"
+
+
+@dataclass(frozen=True)
+class _Wish:
+    """What is to be installed, and for whom."""
+
+    name: str
+    version: str | None
+    robot: Recipient | None
+
+    def check(self, manifest: Manifest) -> None:
+        """Refuse what this robot cannot run (P30)."""
+        reasons = reasons_against(manifest, self.robot.kind, self.robot.api_version) if self.robot else []
+        if reasons:
+            raise Refused(f"cannot install {self.name}: {'; '.join(reasons)}")
 
 
 class _LoopTransport:
@@ -150,7 +185,7 @@ class _LoopTransport:
         with self._lock:
             if self._cancelled:
                 raise Unreachable(f"cannot fetch {url}: it was given up")
-            work = self._client.download(url, write, limit, timeout, on_progress)
+            work = self._watched(url, write, limit, timeout, on_progress)
             self._running = asyncio.run_coroutine_threadsafe(work, self._loop)
         try:
             self._running.result(timeout + 5)
@@ -159,6 +194,28 @@ class _LoopTransport:
         except TimeoutError:
             self._running.cancel()
             raise Unreachable(f"cannot fetch {url} within {timeout:g} s: try again later") from None
+
+    async def _watched(self, url: str, write: Writer, limit: int, timeout: float, on_progress: Progress | None) -> int:
+        """Fetch, and give up a line that is kept open by a trickle (Uptane's slow retrieval)."""
+        count = before = 0
+
+        def counted(piece: bytes) -> object:
+            nonlocal count
+            count += len(piece)
+            return write(piece)
+
+        work = asyncio.ensure_future(self._client.download(url, counted, limit, timeout, on_progress))
+        try:
+            while not (await asyncio.wait([work], timeout=self._limits.window))[0]:
+                if 0 < count < before + self._limits.slowest * self._limits.window:
+                    slow = Unreachable(f"cannot fetch {url}: {Attack.SLOW}, {count} bytes so far, try again later")
+                    slow.reason = Attack.SLOW.value
+                    raise slow
+                before = count
+            return work.result()
+        finally:
+            work.cancel()
+            await asyncio.wait([work])
 
     def cancel(self) -> None:
         """End the fetch under way and refuse the next ones."""

@@ -6,18 +6,17 @@ what was. The version before stays (DESIGN §3.4), older ones go.
 """
 
 import errno
-import fcntl
 import secrets
 import shutil
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
+from rapp_hop.errors import HopError, Invalid, Refused
 from rapp_hop.hz.archive import MANIFEST, extract, sync_folder
+from rapp_hop.hz.lock import held
 from rapp_hop.hz.manifest import Manifest, parse_manifest
 from rapp_hop.hz.semver import parse_version
 from rapp_hop.hz.tar import Limits
@@ -25,7 +24,6 @@ from rapp_hop.hz.text import check_name
 
 CURRENT, PREVIOUS = "current", "previous"
 _ASIDE = ".aside-"  # begin of every name that is not finished or not wanted any more
-_PATIENCE = 10.0  # seconds to wait for another installation on the same folder
 
 
 class Source(Protocol):
@@ -51,11 +49,14 @@ class PackageFile:
     name: str
     version: str
     limits: Limits
+    check: Callable[[Manifest], None] = lambda _manifest: None  # raises what stands against it
 
     def unpack(self, folder: Path) -> Manifest:
         """Fill the new folder from the file; see `archive.extract`."""
         with self.path.open("rb") as file:
-            return extract(file, folder, self.limits).manifest
+            manifest = extract(file, folder, self.limits).manifest
+        self.check(manifest)
+        return manifest
 
 
 @dataclass(frozen=True)
@@ -183,8 +184,7 @@ class RappFolder:
         """Hold the folder alone, sweep up what an interrupted call left, and translate the disk's errors."""
         try:
             self.root.mkdir(parents=True, exist_ok=True)
-            with (self.root / ".lock").open("w") as lock:
-                _lock(lock.fileno())
+            with held(self.root / ".lock", "install"):
                 for path in self.root.glob(f"{_ASIDE}*"):
                     shutil.rmtree(path, ignore_errors=True)
                 yield
@@ -196,18 +196,6 @@ class RappFolder:
 def install(source: Source, destination: RappFolder) -> Installed:
     """Install a package: unpack aside, check who it is, rename, switch. See `RappFolder.place` for the errors."""
     return destination.place(source)
-
-
-def _lock(handle: int) -> None:
-    end = time.monotonic() + _PATIENCE
-    while True:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return
-        except BlockingIOError:
-            if time.monotonic() > end:
-                raise Unreachable("cannot install now: another installation runs, try again") from None
-            time.sleep(0.02)
 
 
 def _link(folder: Path, name: str, target: str) -> None:

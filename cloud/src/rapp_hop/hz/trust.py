@@ -2,59 +2,46 @@
 
 Rules (TUF specification §5, kept by `tuf.ngclient.Updater`): the root shipped with the robot is the only thing believed
 from the start; a new root is signed by the old one; timestamp, snapshot and targets are signed by the keys that root
-names, never older than what was seen, not expired, and fit each other by version, length and hash; a package has the
-length and hash that targets gives it. No byte is unpacked before all of this holds.
+names, never older than what was seen, not expired, and fit each other by version, length and hash; targets says which
+publisher's list a package's name belongs to, and that list gives its length and hash. No byte is unpacked before all of
+this holds. Beyond TUF: the timestamp says when it was signed, so that a clock that went back is noticed, and a package
+may be for some robots only.
 
 No network here: bytes come through the port `Transport`. The updater keeps what it has seen in a folder of its own.
-Blocking: call it in a thread. One caller at a time (a lock sees to it).
+Blocking: call it in a thread. One caller at a time (locks see to it).
 """
 
-import re
 import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from enum import StrEnum
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO, Any, Protocol
+from urllib.parse import quote
 
 from tuf.api import exceptions as tuf
-from tuf.api.metadata import Metadata, TargetFile, Targets  # type: ignore[attr-defined]  # public, but not in __all__
-from tuf.api.serialization import DeserializationError
+from tuf.api.metadata import Metadata, TargetFile, Targets, Timestamp  # type: ignore[attr-defined]  # public, but not in __all__
 from tuf.ngclient.config import UpdaterConfig
 from tuf.ngclient.fetcher import FetcherInterface
 from tuf.ngclient.updater import Updater
 
-from rapp_hop.errors import Bug, HopError, Invalid, Refused, Unreachable
+from rapp_hop.errors import Bug, Invalid, Refused, Unreachable
 from rapp_hop.hz.archive import package_file_name
+from rapp_hop.hz.attacks import Attack, Away, Untrusted, translated, untrusted
+from rapp_hop.hz.lock import held
 from rapp_hop.hz.semver import Version, parse_version
 from rapp_hop.hz.tar import Limits
 from rapp_hop.hz.text import check_name
 from rapp_hop.streaming import Progress, Writer
 
-_MIXED = re.compile(r"Expected (snapshot version \d|\S+ v\d)")  # versions that do not fit each other, not older ones
+__all__ = ["SIGNED_AT", "YANKED", "Attack", "Release", "Transport", "TrustedStore", "Untrusted", "Versions", "choose"]
 
-
-class Attack(StrEnum):
-    """What somebody who holds the line or the mirror may try; the names are TUF's (specification §1.5)."""
-
-    UNSIGNED = "unsigned or signed by a wrong key"
-    ROLLBACK = "rollback"
-    FREEZE = "freeze"
-    MIX_AND_MATCH = "mix-and-match"
-    WRONG_CONTENT = "wrong hash or length"
-    ENDLESS_DATA = "endless data"
-    MALFORMED = "malformed metadata"
-
-
-class Untrusted(Invalid):
-    """The store, or who pretends to be it, cannot be believed; `attack` says what it looks like, and is the `reason`."""
-
-    def __init__(self, attack: Attack, message: str) -> None:
-        super().__init__(message)
-        self.attack = attack
-        self.reason = attack.value
+SIGNED_AT = "signed_at"  # in the timestamp: when it was signed, ISO 8601
+YANKED = "yanked"  # in a publisher's list: packages that were taken off offer, by path
+CLOCK_TOLERANCE = timedelta(hours=1)  # by which the robot's clock may be behind the store's
+_PATIENCE = 60.0  # seconds for another process that looks at the store
 
 
 class Transport(Protocol):
@@ -70,12 +57,21 @@ class Transport(Protocol):
 
 @dataclass(frozen=True)
 class Release:
-    """A package that the store's targets role vouches for."""
+    """A package that a publisher of the store vouches for."""
 
     name: str
     version: Version
     length: int  # bytes
     target: TargetFile
+    robots: tuple[str, ...] = ()  # names of those it is for; none: all
+
+
+@dataclass(frozen=True)
+class Versions:
+    """All that the store says of one package name."""
+
+    releases: tuple[Release, ...]  # in order
+    yanked: frozenset[str]  # versions taken off offer
 
 
 class TrustedStore:
@@ -95,20 +91,22 @@ class TrustedStore:
         self._limits = limits or Limits()
         self._lock = threading.Lock()
 
-    def releases(self) -> list[Release]:
-        """Refresh the metadata and return every package on offer.
+    def versions(self, name: str) -> Versions:
+        """Refresh the metadata and return what is on offer under a name.
 
         :raises Untrusted: naming the attack
         :raises Unreachable: when the store cannot be reached or is not complete
         """
-        with self._lock, _translated(Attack.MIX_AND_MATCH):
+        with self._lock, translated(Attack.MIX_AND_MATCH), self._alone():
             updater = self._updater()
             updater.refresh()
-            targets = self._trusted_targets()
-            return sorted(
-                (release for path, target in targets.items() if (release := _release(path, target))),
-                key=lambda release: (release.name, release.version.key),
-            )
+            self._check_clock()
+            releases, yanked = [], set()
+            for targets in self._lists(updater, f"{check_name(name)}-0.hz"):
+                found = [_release(path, target) for path, target in targets.targets.items()]
+                releases += [item for item in found if item is not None and item.name == name]
+                yanked |= _yanked(targets, name)
+            return Versions(tuple(sorted(releases, key=lambda item: item.version.key)), frozenset(yanked))
 
     def download(self, release: Release, destination: Path, on_progress: Progress | None = None) -> None:
         """Write the package of `release` to `destination`, verified; nothing is written when it is wrong.
@@ -119,17 +117,24 @@ class TrustedStore:
         """
         if release.length > self._limits.packed:
             raise Invalid(f"cannot download {release.name}: {release.length} bytes, {self._limits.packed} are allowed")
-        with self._lock, _translated(Attack.WRONG_CONTENT), self._fetcher.watched(on_progress):
-            updater = self._updater()
-            target = updater.get_targetinfo(release.target.path)
+        with self._lock, translated(Attack.WRONG_CONTENT), self._fetcher.watched(on_progress):
+            with self._alone():
+                updater = self._updater()
+                target = updater.get_targetinfo(release.target.path)
             if target is None:
                 raise Refused(f"cannot download {release.name} {release.version}: the store offers it no more")
             if target != release.target:
                 raise Unreachable(f"cannot download {release.name}: the store changed meanwhile, try again")
             updater.download_target(target, str(destination))
 
-    def _updater(self) -> Updater:
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Hold the folder of what was seen; another process may install too."""
         self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with held(self._folder / ".lock", "look at the store", _PATIENCE):
+            yield
+
+    def _updater(self) -> Updater:
         return Updater(
             metadata_dir=str(self._folder),
             metadata_base_url=f"{self._url}/metadata/",
@@ -139,20 +144,48 @@ class TrustedStore:
             bootstrap=self._root,
         )
 
-    def _trusted_targets(self) -> dict[str, TargetFile]:
-        # The updater offers no list; its cache holds the targets role it has just verified.
-        return Metadata[Targets].from_bytes((self._folder / "targets.json").read_bytes()).signed.targets
+    def _lists(self, updater: Updater, path: str) -> list[Targets]:
+        """Return the lists that may hold `path`, verified: targets, then those of the publishers it is delegated to."""
+        updater.get_targetinfo(path)  # no such version is ever there, so this loads every list on the way
+        found = [self._cached("targets", Targets)]
+        for name, terminating in found[0].delegations.get_roles_for_target(path) if found[0].delegations else ():
+            found.append(self._cached(name, Targets))
+            if terminating:
+                break
+        return found
+
+    def _check_clock(self) -> None:
+        """Without a right clock no expiry means anything."""
+        text = self._cached("timestamp", Timestamp).unrecognized_fields.get(SIGNED_AT)
+        if text is None:
+            return
+        try:
+            signed = datetime.fromisoformat(str(text))
+            wrong = datetime.now(UTC) < signed - CLOCK_TOLERANCE
+        except (ValueError, TypeError):
+            raise untrusted(Attack.MALFORMED, f"{SIGNED_AT} is no time") from None
+        if wrong:
+            raise untrusted(Attack.CLOCK, f"the robot's clock says {datetime.now(UTC):%F %R}, the store signed at {signed:%F %R}")
+
+    def _cached(self, role: str, kind: type[Any]) -> Any:
+        # The updater offers no lists; its cache holds the ones it has just verified.
+        return Metadata[Any].from_bytes((self._folder / f"{quote(role, '')}.json").read_bytes()).signed
 
 
-def newest(releases: list[Release], name: str, version: str | None = None) -> Release:
+def choose(offered: Versions, name: str, version: str | None = None, robot: str | None = None) -> Release:
     """Return the release asked for; without a version the newest one, pre-releases only when nothing else is there.
 
+    :param robot: this robot's name: what is only for others is left out
     :raises Refused: when the store has no such package
+    :raises Untrusted: when all there is, is for other robots
     """
-    found = [item for item in releases if item.name == name and version in (None, item.version.text)]
+    found = [item for item in offered.releases if version in (None, item.version.text)]
     if not found:
         raise Refused(f"cannot find {name} {version or ''}".rstrip() + " in the store: ask for the list of RApps")
-    return max(found, key=lambda item: ("-" not in item.version.text, item.version.key))
+    fitting = [item for item in found if robot is None or robot in (item.robots or (robot,))]
+    if not fitting:
+        raise untrusted(Attack.OTHER_ROBOT, f"{name} is for {', '.join(found[-1].robots)}, this is {robot}")
+    return max(fitting, key=lambda item: ("-" not in item.version.text, item.version.key))
 
 
 def _release(path: str, target: TargetFile) -> Release | None:
@@ -163,7 +196,15 @@ def _release(path: str, target: TargetFile) -> Release | None:
         return None
     if path != package_file_name(name, version.text):
         return None
-    return Release(name, version, target.length, target)
+    robots = custom.get("robots", [])
+    if not isinstance(robots, list):
+        return None
+    return Release(name, version, target.length, target, tuple(str(robot) for robot in robots))
+
+
+def _yanked(targets: Targets, name: str) -> set[str]:
+    paths = targets.unrecognized_fields.get(YANKED, {})
+    return {path[len(name) + 1 : -3] for path in paths if path.startswith(f"{name}-")} if isinstance(paths, dict) else set()
 
 
 class _Fetcher(FetcherInterface):
@@ -195,37 +236,6 @@ class _Fetcher(FetcherInterface):
             except Invalid as error:
                 raise tuf.DownloadLengthMismatchError(str(error)) from None
             except Unreachable as error:
-                raise tuf.DownloadError(str(error)) from None
+                raise Away(error) from None
             file.seek(0)
             yield file
-
-
-@contextmanager
-def _translated(misfit: Attack) -> Iterator[None]:
-    """Turn `tuf`'s exceptions into ours, once; `misfit` names what bytes with a wrong hash or length mean here."""
-    try:
-        yield
-    except HopError:
-        raise
-    except tuf.DownloadLengthMismatchError as error:
-        raise _untrusted(Attack.ENDLESS_DATA, error) from None
-    except tuf.DownloadHTTPError as error:
-        raise Unreachable(f"cannot use the store now: {error}", error.status_code) from None
-    except tuf.DownloadError as error:
-        raise Unreachable(str(error)) from None
-    except (tuf.RepositoryError, DeserializationError) as error:
-        raise _untrusted(_attack(error, misfit), error) from None
-
-
-def _attack(error: Exception, misfit: Attack) -> Attack:
-    if isinstance(error, tuf.UnsignedMetadataError):
-        return Attack.UNSIGNED
-    if isinstance(error, tuf.ExpiredMetadataError):
-        return Attack.FREEZE
-    if isinstance(error, tuf.BadVersionNumberError):
-        return Attack.MIX_AND_MATCH if _MIXED.match(str(error)) else Attack.ROLLBACK
-    return misfit if isinstance(error, tuf.LengthOrHashMismatchError) else Attack.MALFORMED
-
-
-def _untrusted(attack: Attack, error: Exception) -> Untrusted:
-    return Untrusted(attack, f"cannot trust the store ({attack}): {error}, nothing was installed")

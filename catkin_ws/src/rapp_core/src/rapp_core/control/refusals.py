@@ -5,7 +5,7 @@ from rapp_core.errors import CoreError, Unreachable
 AWAY = "I cannot reach the platform"
 ODD = "The platform does not answer as it should"
 
-_ATTACKS = {  # the link's reasons are TUF's names of attacks (rapp_hop.hz.trust)
+_ATTACKS = {  # the link's reasons are TUF's names of attacks (rapp_hop.hz.attacks)
     "unsigned or signed by a wrong key": "it is not signed by my store",
     "wrong hash or length": "it was changed on its way",
     "rollback": "it is older than what I had",
@@ -13,16 +13,19 @@ _ATTACKS = {  # the link's reasons are TUF's names of attacks (rapp_hop.hz.trust
     "mix-and-match": "the store's lists do not fit each other",
     "endless data": "it is longer than it should be",
     "malformed metadata": "the store's lists are broken",
+    "slow retrieval": "it comes too slowly",
+    "replay to another robot": "it is for another robot",
+    "wrong clock": "my clock is wrong",
 }
 
 
 def not_installed(name: str, error: CoreError) -> str:
     """What to say of a RApp that was not installed."""
     spoken = name.replace("_", " ")
-    if isinstance(error, Unreachable):
-        return AWAY
     why = _ATTACKS.get(error.reason)
-    return f"I refuse to install {spoken}, {why}" if why else f"I cannot install {spoken}"
+    if why:
+        return f"I refuse to install {spoken}, {why}"
+    return AWAY if isinstance(error, Unreachable) else f"I cannot install {spoken}"
 
 
 def not_interpreted(error: CoreError) -> str:

@@ -1,0 +1,172 @@
+"""Who may sign for what: keys made, rotated and revoked; publishers, and the names of packages that are theirs.
+
+A name belongs to the publisher who first published under it, also after their key was revoked: the register of names
+stays in the signed targets list.
+"""
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from tuf.api.metadata import DelegatedRole, Delegations, Targets  # type: ignore[attr-defined]
+
+from rapp_cloud.keys import ROLES
+from rapp_cloud.ledger import Ledger, Lists
+from rapp_hop.errors import Refused
+from rapp_hop.hz.text import check_name
+from rapp_hop.hz.trust import YANKED
+
+_REVOKED = "revoked"  # in targets: publishers, with their keys and names
+
+
+@dataclass(frozen=True)
+class Holder:
+    """A role or publisher, as `./rapp keys list` shows them."""
+
+    name: str
+    keys: tuple[str, ...]  # key ids; none: revoked
+    expires: datetime | None
+    here: bool  # whether the private key is in the folder
+    packages: tuple[str, ...] = ()
+
+
+class Custody:
+    """The keys of one store and what they stand for. Blocking; each call holds the store's lock."""
+
+    def __init__(self, ledger: Ledger) -> None:
+        self._ledger = ledger
+
+    def holders(self) -> list[Holder]:
+        """Return all roles and publishers, revoked ones last."""
+        lists, here = self._ledger.read(), set(self._ledger.keys.names())
+        expiries = {name: getattr(lists, name).expires for name in ROLES}
+        found = [Holder(name, tuple(lists.root.roles[name].keyids), expiries[name], name in here) for name in ROLES]
+        for name, role in sorted(delegated(lists).items()):
+            names = tuple(package_of(path) for path in role.paths or ())
+            found.append(Holder(name, tuple(role.keyids), lists.publishers[name].expires, name in here, names))
+        gone = _revoked(lists)
+        return [*found, *(Holder(name, (), None, False, tuple(gone[name]["names"])) for name in sorted(gone))]
+
+    def add(self, publisher: str) -> None:
+        """Make a publisher's key and let them publish; one whose key was revoked gets their names back.
+
+        :raises Refused: when there is such a publisher, or the name is a role's
+        """
+        with self._ledger.locked():
+            lists = self._ledger.read()
+            if check_name(publisher) in ROLES or publisher in delegated(lists) or publisher.startswith("next_"):
+                raise Refused(f"cannot make the publisher {publisher}: the name is taken")
+            add_publisher(self._ledger, lists, publisher)
+            self._ledger.write(lists, ["targets", publisher])
+
+    def rotate(self, name: str) -> None:
+        """Give a role or publisher a new key; the old one is worth nothing from then on.
+
+        A new root is signed by the old key too, so that robots follow.
+
+        :raises Refused: when there is no such role or publisher, or a key that must sign is not here
+        """
+        with self._ledger.locked():
+            lists = self._ledger.read()
+            if name in ROLES:
+                self._rotate_role(lists, name)
+            elif name in delegated(lists):
+                self._rotate_publisher(lists, name)
+            else:
+                raise Refused(f"cannot rotate the key of {name}: it has none, see ./rapp keys list")
+
+    def revoke(self, publisher: str) -> None:
+        """Take a publisher's right to sign away: nothing they have signed is on offer any more.
+
+        :raises Refused: when there is no such publisher; a role's key is rotated
+        """
+        with self._ledger.locked():
+            lists = self._ledger.read()
+            if publisher in ROLES:
+                raise Refused(f"cannot revoke the key of {publisher} without another: rotate it")
+            role = delegated(lists).get(publisher)
+            if role is None:
+                raise Refused(f"cannot revoke the key of {publisher}: it has none, see ./rapp keys list")
+            names = [package_of(path) for path in role.paths or ()]
+            lists.targets.unrecognized_fields[_REVOKED] = {
+                **_revoked(lists), publisher: {"keyids": list(role.keyids), "names": names},
+            }  # fmt: skip
+            for keyid in list(role.keyids):
+                lists.targets.revoke_key(keyid, publisher)
+            del delegated(lists)[publisher]
+            del lists.publishers[publisher]
+            self._ledger.write(lists, ["targets"])
+            self._ledger.keys.remove(publisher)
+
+    def _rotate_role(self, lists: Lists, name: str) -> None:
+        old, root = self._ledger.signer(lists, "root"), lists.root
+        new = self._ledger.prepare(lists, name)
+        for keyid in list(root.roles[name].keyids):
+            root.revoke_key(keyid, name)
+        root.add_key(new.public_key, name)
+        root.version += 1
+        self._ledger.write_root(root, [old, new] if name == "root" else [old])
+        self._ledger.settle(name)
+        if name != "root":
+            self._ledger.write(lists, () if name == "timestamp" else [name])
+
+    def _rotate_publisher(self, lists: Lists, name: str) -> None:
+        new = self._ledger.prepare(lists, name)
+        for keyid in list(delegated(lists)[name].keyids):
+            lists.targets.revoke_key(keyid, name)
+        lists.targets.add_key(new.public_key, name)
+        self._ledger.write(lists, ["targets", name])
+
+
+def add_publisher(ledger: Ledger, lists: Lists, publisher: str) -> Targets:
+    """Make a publisher's key and empty list among `lists`, not written yet. See `Custody.add`."""
+    signer = ledger.prepare(lists, publisher)
+    before = _revoked(lists).pop(publisher, None)
+    paths = [pattern(name) for name in before["names"]] if before else []
+    if lists.targets.delegations is None:
+        lists.targets.delegations = Delegations({}, {})
+    delegated(lists)[publisher] = DelegatedRole(publisher, [], 1, True, paths)
+    lists.targets.add_key(signer.public_key, publisher)
+    own = Targets()
+    known = lists.snapshot.meta.get(f"{publisher}.json")
+    own.version = known.version if known else 0
+    if known:  # its packages stay known, so that no version comes back with other bytes
+        old = ledger.list_of(publisher, known.version)
+        hashes = {path: target.hashes["sha256"] for path, target in old.targets.items()}
+        own.unrecognized_fields[YANKED] = {**old.unrecognized_fields.get(YANKED, {}), **hashes}
+    lists.publishers[publisher] = own
+    return own
+
+
+def delegated(lists: Lists) -> dict[str, DelegatedRole]:
+    """Return the publishers' delegations, to be read or changed."""
+    delegations = lists.targets.delegations
+    return {} if delegations is None or delegations.roles is None else delegations.roles
+
+
+def owner_of(lists: Lists, name: str) -> str | None:
+    """Return the publisher that a package name belongs to, None for nobody's.
+
+    :raises Refused: when that publisher's key was revoked
+    """
+    for publisher, role in delegated(lists).items():
+        if pattern(name) in (role.paths or ()):
+            return publisher
+    for publisher, entry in _revoked(lists).items():
+        if name in entry["names"]:
+            raise Refused(f"cannot publish {name}: it is {publisher}'s, whose key was revoked; make a new one for them first")
+    return None
+
+
+def pattern(name: str) -> str:
+    """Return TUF's path pattern of all versions of a package."""
+    return f"{name}-*.hz"
+
+
+def package_of(path: str) -> str:
+    """Return the package that a pattern of ours stands for."""
+    return path.removesuffix("-*.hz")
+
+
+def _revoked(lists: Lists) -> dict[str, dict[str, list[str]]]:
+    found: dict[str, dict[str, list[str]]] = lists.targets.unrecognized_fields.setdefault(_REVOKED, {})
+    return found
