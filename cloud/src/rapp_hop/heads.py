@@ -1,11 +1,10 @@
-"""What the parts of the server hand to each other: a request's head, and the job that answers it, and how far both have come."""
+"""What the parts of the server hand to each other: a request's head, and the job that answers it."""
 
 from dataclasses import dataclass
 from typing import Protocol
 
 from rapp_hop.errors import HopError
 from rapp_hop.protocol import Body, WireAnswer, WireRequest
-from rapp_hop.spool import Spool
 
 
 @dataclass(slots=True)
@@ -36,17 +35,3 @@ class Job(Protocol):
 
     async def done(self) -> None:
         """Clean up; the answer has been sent, or could not be."""
-
-
-class Exchange:
-    """One request and what becomes of it."""
-
-    __slots__ = ("answer", "body", "head", "job", "keep", "version")
-
-    def __init__(self, head: Head | None, keep: bool, version: str) -> None:
-        self.head = head
-        self.keep = keep
-        self.version = version
-        self.job: Job | None = None
-        self.answer: WireAnswer | None = None
-        self.body: Spool | None = None

@@ -1,27 +1,34 @@
-"""The serving half of HOP: connections outside, `forms`, `service` and `runner` inside.
+"""The serving half of HOP: Tornado's HTTP server outside, `forms`, `service` and `runner` inside.
 
 Before a byte of a body is taken the caller is known and the length is allowed. Errors are answered in the caller's form
 with a kind and a message; what went wrong inside is logged here and never sent.
 """
 
 import asyncio
-import base64
-import binascii
+import contextlib
+import functools
 import logging
 import socket
+import ssl
+import sys
 import time
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import urlsplit
+from typing import Any
 
-from tornado.netutil import bind_sockets, bind_unix_socket
+from tornado.httpserver import HTTPServer
+from tornado.httputil import HTTPConnection, HTTPMessageDelegate, HTTPServerConnectionDelegate
+from tornado.netutil import add_accept_handler, bind_sockets, bind_unix_socket
 
+from rapp_hop.callers import check_origin, token_of
 from rapp_hop.calls import MountJob, ServiceJob, note
-from rapp_hop.connection import Connection
-from rapp_hop.errors import HopError, Refused, Unreachable
+from rapp_hop.connection import Message
+from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
 from rapp_hop.fairness import Brake, Fairness
 from rapp_hop.forms import OWN, form_of
+from rapp_hop.heading import long_head
 from rapp_hop.heads import Head, Job
 from rapp_hop.mounts import Mount
 from rapp_hop.page import load_pages
@@ -29,8 +36,10 @@ from rapp_hop.protocol import Form, WireAnswer
 from rapp_hop.registry import ServiceRegistry
 from rapp_hop.repeats import Repeats
 from rapp_hop.runner import Runner
+from rapp_hop.sending import head_of
 from rapp_hop.service import BASE, Authenticate
 from rapp_hop.spool import Spool
+from rapp_hop.streams import PatientStream, PatientTlsStream
 
 _log = logging.getLogger(__name__)
 
@@ -62,31 +71,45 @@ class HopServer:
         uploads: Path,
         mounts: Iterable[Mount] = (),
         limits: ServerLimits | None = None,
+        runner: Runner | None = None,
+        tls: ssl.SSLContext | None = None,
     ) -> None:
         """Prepare; opens no port yet. Needs a running loop.
 
         :param authenticate: from a token (`Accept-Token`, or `Authorization`) to the caller, None for nobody
         :param uploads: folder for files while a call runs
+        :param runner: another server's, whose places are shared; that server closes it
+        :param tls: what `listen` speaks TLS with; UNIX sockets speak none
         """
         self.limits = limits or ServerLimits()
         self.registry = registry
-        self.runner = Runner()
+        self.runner = runner or Runner()
+        self._own_runner = runner is None
         self.repeats = Repeats(time.monotonic)
         self.uploads = uploads
         self.brake = Brake(self.limits.log_lines, time.monotonic)
         self.header_bytes = self.limits.headers
         self.header_timeout = self.limits.header_timeout
         self.body_timeout = self.limits.body_timeout
-        self.idle_timeout = self.limits.idle_timeout
         self.send_timeout = self.limits.send_timeout
         self._authenticate = authenticate
         self._mounts = tuple(mounts)
         self._pages = load_pages()
+        self._farewells = (
+            self._last_words(Invalid("cannot read the request: it is no HTTP")),
+            self._last_words(long_head(self.header_bytes)),
+        )
         self._fairness = Fairness(self.limits.rate, self.limits.burst, time.monotonic)
+        self._tls = tls
         self._loop = asyncio.get_running_loop()
-        self._connections: set[Connection] = set()
-        self._of_address: dict[str, int] = {}
-        self._servers: list[asyncio.Task[asyncio.Server]] = []
+        # Tornado's own limit on bodies would answer with a bare 400; each job has its own.
+        self._http = HTTPServer(_Requests(self), max_header_size=self.limits.headers, max_body_size=sys.maxsize,
+                                idle_connection_timeout=self.limits.idle_timeout)  # fmt: skip
+        self._messages: set[Message] = set()
+        self._streams: dict[PatientStream | PatientTlsStream, str] = {}
+        self._of_address: Counter[str] = Counter()
+        self._stop_listening: list[Callable[[], None]] = []
+        self._sockets: list[socket.socket] = []
         self._sweeping = self._loop.create_task(self._sweep())
         self._warming: asyncio.Task[None] | None = None
 
@@ -100,7 +123,7 @@ class HopServer:
         except OSError as error:
             raise Refused(f"cannot listen on {address}:{port}: {error.strerror}, choose another port") from None
         for one in sockets:
-            self.listen_on(one)
+            self.listen_on(one, self._tls)
         return int(sockets[0].getsockname()[1])
 
     def listen_unix(self, path: Path, mode: int = 0o600) -> None:
@@ -114,43 +137,77 @@ class HopServer:
         except (OSError, ValueError) as error:
             raise Refused(f"cannot listen on {path}: {error}, choose another path") from None
 
-    def listen_on(self, listening: socket.socket) -> None:
+    def listen_on(self, listening: socket.socket, tls: ssl.SSLContext | None = None) -> None:
         """Serve on a socket that listens already; processes that share it share its callers."""
-        unix = listening.family == socket.AF_UNIX
-        create = self._loop.create_unix_server if unix else self._loop.create_server
-        self._servers.append(self._loop.create_task(create(lambda: Connection(self, self._loop), sock=listening)))
+        listening.setblocking(False)
+        self._sockets.append(listening)
+        self._stop_listening.append(add_accept_handler(listening, functools.partial(self._accept, tls)))
         if self._warming is None:
             self._warming = self._loop.create_task(self.runner.warm(self.registry))
 
     async def close(self) -> None:
         """Take no new connections, give running calls a moment, end."""
-        for server in await asyncio.gather(*self._servers):
-            server.close()
+        for stop in self._stop_listening:
+            stop()
+        for listening in self._sockets:
+            listening.close()
         end = self._loop.time() + self.limits.drain
-        while any(connection.busy for connection in self._connections) and self._loop.time() < end:
+        while any(message.busy for message in self._messages) and self._loop.time() < end:
             await asyncio.sleep(0.02)
         self._sweeping.cancel()
-        for connection in list(self._connections):
-            connection.close()
+        for message in list(self._messages):
+            message.cancel()
+        await self._http.close_all_connections()
         await asyncio.gather(self._sweeping, *([self._warming] if self._warming else []), return_exceptions=True)
-        await self.runner.close()
+        if self._own_runner:
+            await self.runner.close()
 
-    # the connections' side, see `connection.Site`
+    def start_request(self, line: HTTPConnection) -> Message:
+        """Expect the next request of a connection."""
+        stream = line.stream  # type: ignore[attr-defined]
+        message = Message(self, line, stream, self._streams.get(stream, ""))
+        self._messages.add(message)
+        return message
 
-    def opened(self, connection: Connection) -> HopError | None:
-        """Count a connection; turn it away when there are too many."""
-        self._connections.add(connection)
-        count = self._of_address[connection.address] = self._of_address.get(connection.address, 0) + 1
-        if len(self._connections) > self.limits.connections or (connection.address and count > self.limits.connections_of_one):
-            return Unreachable("cannot serve so many connections: try again later", 503)
-        return None
+    def ended(self, message: Message) -> None:
+        """Forget a request."""
+        self._messages.discard(message)
 
-    def closed(self, connection: Connection) -> None:
-        """Forget a connection."""
-        self._connections.discard(connection)
-        left = self._of_address.pop(connection.address, 1) - 1
-        if left > 0:
-            self._of_address[connection.address] = left
+    def _accept(self, tls: ssl.SSLContext | None, connection: socket.socket, peer: Any) -> None:
+        address = peer[0] if isinstance(peer, tuple) else ""
+        if len(self._streams) >= self.limits.connections or (
+            address and self._of_address[address] >= self.limits.connections_of_one
+        ):
+            error = Unreachable("cannot serve so many connections: try again later", 503)
+            connection.setblocking(False)
+            with contextlib.suppress(OSError):
+                connection.send(self._last_words(error) if tls is None else b"")
+            connection.close()
+            return
+        stream = self._stream(connection, tls)
+        stream.malformed, stream.too_long = self._farewells
+        stream.on_closed = functools.partial(self._forget, stream)
+        self._streams[stream] = address
+        self._of_address[address] += 1
+        stream.set_nodelay(True)
+        self._http.handle_stream(stream, peer)
+
+    def _stream(self, connection: socket.socket, tls: ssl.SSLContext | None) -> PatientStream | PatientTlsStream:
+        if tls is None:
+            return PatientStream(connection)
+        wrapped = tls.wrap_socket(connection, server_side=True, do_handshake_on_connect=False)
+        return PatientTlsStream(wrapped)
+
+    def _last_words(self, error: HopError) -> bytes:
+        answer = OWN.write_error(error, None)
+        assert isinstance(answer.body, bytes)
+        return head_of(answer, False, len(answer.body)) + answer.body
+
+    def _forget(self, stream: PatientStream | PatientTlsStream) -> None:
+        address = self._streams.pop(stream, "")
+        self._of_address[address] -= 1
+        if self._of_address[address] <= 0:
+            del self._of_address[address]
 
     def spool(self) -> Spool:
         """Return a place for a body."""
@@ -184,7 +241,7 @@ class HopServer:
             return self._mounted(head, "", mount, form)
         if mount is None and not head.path.startswith(BASE):
             raise Refused("cannot find this page: see /hop/available_services", 404)
-        _check_origin(head.headers)
+        check_origin(head.headers)
         caller = self._authenticate(token_of(head.headers))
         if caller is None:
             raise Refused("cannot serve this caller: send a valid Accept-Token", 401)
@@ -204,46 +261,27 @@ class HopServer:
         return MountJob(self.brake, head, caller, mount, form)
 
     async def _sweep(self) -> None:
-        bounds = (self.header_timeout, self.body_timeout, self.idle_timeout, self.send_timeout)
-        period = min(max(min(bounds) / 4, 0.02), 1.0)
+        period = min(max(min(self.header_timeout, self.body_timeout) / 4, 0.02), 0.25)
         while True:
             await asyncio.sleep(period)
             now = self._loop.time()
-            for connection in list(self._connections):
-                if connection.deadline is not None and now > connection.deadline:
-                    connection.overdue()
+            for message in list(self._messages):
+                if message.deadline is not None and now > message.deadline:
+                    message.overdue()
+                elif message.stream.expecting and now - (message.stream.began or now) > self.header_timeout:
+                    self._too_slow(message.stream)
+
+    def _too_slow(self, stream: PatientStream | PatientTlsStream) -> None:
+        stream.write(self._last_words(Unreachable("cannot wait any longer for the headers of the request", 408)))
+        stream.close()
 
 
-def token_of(headers: Mapping[str, str]) -> str | None:
-    """Return the token of a request: `Accept-Token`, or `Authorization` (Bearer, or Basic with it as password).
+class _Requests(HTTPServerConnectionDelegate):
+    """Tornado's way to ask who takes a request."""
 
-    :raises Refused: with status 401, when there are two that differ
-    """
-    own = headers.get("accept-token")
-    authorization = headers.get("authorization")
-    if authorization is None:
-        return own
-    other = _authorized(authorization)
-    if own is not None and own != other:
-        raise Refused("cannot tell who calls: Accept-Token and Authorization differ", 401)
-    return other
+    def __init__(self, server: HopServer) -> None:
+        self._server = server
 
-
-def _authorized(value: str) -> str | None:
-    scheme, _, rest = value.partition(" ")
-    if scheme.lower() == "bearer":
-        return rest.strip()
-    if scheme.lower() != "basic":
-        return None
-    try:
-        return base64.b64decode(rest.strip(), validate=True).decode("utf-8").partition(":")[2]
-    except (binascii.Error, UnicodeDecodeError):
-        return None
-
-
-def _check_origin(headers: Mapping[str, str]) -> None:
-    """A browser on somebody else's page must not call in the name of its user (input H20)."""
-    origin = headers.get("origin")
-    foreign = origin is not None and urlsplit(origin).netloc.lower() != headers.get("host", "").lower()
-    if foreign or headers.get("sec-fetch-site") in ("cross-site", "same-site"):
-        raise Refused("cannot serve another site's page: open the platform's own", 403)
+    def start_request(self, server_conn: object, request_conn: HTTPConnection) -> HTTPMessageDelegate:
+        """See Tornado."""
+        return self._server.start_request(request_conn)
