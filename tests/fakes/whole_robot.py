@@ -248,9 +248,10 @@ class WholeRobot:
         while True:
             runs = list((self.home / "runs").iterdir())
             sandboxes = {words for words in processes_of(self.home / "runs") if words.startswith("bwrap")}
-            if len(runs) <= 1 and len(sandboxes) <= 1:
+            gates = [words for words in processes_of(self.ros["ROS_MASTER_URI"]) if "rapp_core.gate" in words]
+            if len(runs) <= 1 and len(sandboxes) <= 1 and len(gates) <= 1:
                 return
-            assert time.monotonic() < deadline, f"left running: {runs} {sandboxes}"
+            assert time.monotonic() < deadline, f"left running: {runs} {sandboxes} {gates}"
             time.sleep(0.1)
 
     def said(self, since: int = 0) -> list[str]:
@@ -299,8 +300,8 @@ def listening_after(moment: Seen) -> Callable[[Seen], bool]:
     return lambda seen: entered("s3")(seen) and seen.time > moment.time
 
 
-def processes_of(folder: Path, but: Sequence[int] = ()) -> list[str]:
-    """Command lines of the running processes that name the folder."""
+def processes_of(folder: Path | str, but: Sequence[int] = ()) -> list[str]:
+    """Command lines of the running processes that name the folder, or whatever is given."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         with suppress(OSError):  # it may end meanwhile
