@@ -6,7 +6,7 @@ import pytest
 
 from rapp_cli.errors import CommandError
 from rapp_cli.timeline import Entry
-from rapp_cli.trace.messages import LONGEST, Item, entries, item, last_run, pairs, squeezed
+from rapp_cli.trace.messages import LONGEST, Item, entries, folded, item, last_run, pairs, squeezed
 
 
 def core(kind: str, state: str = "s9", detail: str = "", time: float = 0.0) -> Entry:
@@ -157,3 +157,37 @@ def test_replies_find_their_calls() -> None:
         message("reply", "b", "a", "x"), message("call", "a", "b", "never answered"),
     ]  # fmt: skip
     assert pairs(items) == [(0, 6), (1, 4), (2, 3)]
+
+
+POSE = [message("call", "dynamic", "core", "rapp_get_robot_pose"), message("reply", "core", "dynamic", "rapp_get_robot_pose")]
+WALK = message("call", "dynamic", "core", "rapp_move_to")
+ASKED = message("call", "core", "ALMotion", "moveTo")
+STATE = Item("state", "dynamic", "dynamic", "s33 walk", 0.0)
+
+
+def labels(items: Sequence[Item]) -> list[str]:
+    return [each.label for each in items]
+
+
+def test_polling_is_one_question_with_its_times_even_among_other_messages() -> None:
+    question = "rapp_get_robot_pose (7 times)"
+    found = folded([WALK, *POSE * 3, ASKED, *POSE * 3, POSE[0], ASKED, POSE[1], STATE, *POSE])
+    assert labels(found) == ["rapp_move_to", question, question, "moveTo", "moveTo", "s33 walk", *["rapp_get_robot_pose"] * 2]
+    assert len(pairs(found)) == 2
+
+
+def test_a_question_asked_a_few_times_is_shown_each_time() -> None:
+    assert folded([*POSE * 3, STATE, *POSE * 3]) == [*POSE * 3, STATE, *POSE * 3]
+
+
+def test_what_others_are_asked_for_is_no_polling() -> None:
+    say = [
+        message("call", "dynamic", "core", "rapp_say"), message("call", "core", "ALTextToSpeech", "say"),
+        message("reply", "ALTextToSpeech", "core", "say"), message("reply", "core", "dynamic", "rapp_say"),
+    ]  # fmt: skip
+    assert [each for each in folded(say * 5) if each.text == "rapp_say"] == [say[0], say[3]] * 5
+
+
+def test_different_answers_are_different() -> None:
+    refused = message("reply", "core", "dynamic", "rapp_get_robot_pose: refused")
+    assert len(folded([*POSE * 4, POSE[0], refused])) == 4

@@ -5,12 +5,14 @@ import json
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import Literal
 
 from rapp_cli.errors import CommandError
 from rapp_cli.timeline import KINDS, Entry
 
 LONGEST = 200  # characters of one text
+SHOWN = 3  # times that the same question is shown within one state; who asks more often polls
 _ARROW = re.compile(r"(?P<source>[\w-]+)->(?P<target>[\w-]+) (?P<reply>reply )?(?P<text>.+?)(?P<send> \(asynchronous\))?")
 _NOTE = re.compile(r"(?P<source>[\w-]+): (?P<text>.+)")
 _TALK = ("said", "heard")
@@ -66,7 +68,7 @@ def last_run(record: Sequence[Entry]) -> list[Item]:
     run = [*_command(record[:left]), *record[left : next(ends, len(record)) + 1]]
     spoken = any(entry.agent == "person" for entry in run)
     items = [item(entry, spoken=spoken) for entry in run]
-    return squeezed(each for each in items if each is not None)
+    return squeezed(folded([each for each in items if each is not None]))
 
 
 def _command(before: Sequence[Entry]) -> list[Entry]:
@@ -124,6 +126,27 @@ def squeezed(items: Iterable[Item]) -> list[Item]:
         else:
             kept.append(each)
     return kept
+
+
+def folded(items: Sequence[Item]) -> list[Item]:
+    """Polling becomes one question and its answer, where it begins, with how many times.
+
+    That is the same call with the same reply, more than `SHOWN` times between two changes of state, for which nobody else is asked:
+    mostly nothing is told between call and reply.
+    """
+    state = list(accumulate(each.kind == "state" for each in items))
+    groups: dict[tuple[int, Item, Item], list[tuple[int, int]]] = {}
+    for call, reply in pairs(items):
+        key = (state[call], replace(items[call], time=0), replace(items[reply], time=0))
+        groups.setdefault(key, []).append((call, reply))
+    kept: list[Item | None] = list(items)
+    for found in groups.values():
+        if len(found) > SHOWN and 2 * sum(reply == call + 1 for call, reply in found) > len(found):
+            for call, reply in found[1:]:
+                kept[call] = kept[reply] = None
+            for index in found[0]:
+                kept[index] = replace(items[index], times=len(found))
+    return [each for each in kept if each is not None]
 
 
 def pairs(items: Sequence[Item]) -> list[tuple[int, int]]:
