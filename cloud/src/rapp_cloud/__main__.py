@@ -15,6 +15,7 @@ from rapp_cloud.config import CloudConfig, load_config
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import passphrase_from
 from rapp_cloud.profiles import Profile, Profiles
+from rapp_cloud.tls import CERTIFICATE, make_certificate
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
 from rapp_hop.hz.text import check_name
@@ -41,6 +42,8 @@ def _options(words: list[str]) -> CloudConfig:
     parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="made by `init`")
     parser.add_argument("--port", type=int, help="0: any free one")
     parser.add_argument("--address", help="to listen on")
+    parser.add_argument("--certificate", type=Path, metavar="FILE", help="for TLS; default: none on loopback")
+    parser.add_argument("--certificate-key", type=Path, metavar="FILE", help="its key")
     parser.add_argument("--publish", action="append", metavar="DIR", help="source of a RApp to offer; may be repeated")
     parser.add_argument("--token-file", type=Path, metavar="FILE", help="default: DIR/tokens.json")
     parser.add_argument("--passphrase-file", type=Path, metavar="FILE", help="of the store's keys; default: beside them")
@@ -63,6 +66,7 @@ def _init(words: list[str]) -> int:
     parser = argparse.ArgumentParser("python -m rapp_cloud init", description="Make keys, a store, a robot's token.")
     parser.add_argument("--data", type=Path, required=True, metavar="DIR")
     parser.add_argument("--robot", required=True, metavar="NAME")
+    parser.add_argument("--host", action="append", metavar="NAME", help="make a certificate for this name or address too")
     options = parser.parse_args(words)
     data, robot = options.data, check_name(options.robot)
     data.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -78,7 +82,11 @@ def _init(words: list[str]) -> int:
         write_whole(token_file, Accounts(data / "tokens.json").add(robot).encode(), mode=0o600)
     if not (data / "profiles" / f"{robot}.json").exists():
         Profiles(data / "profiles").put(robot, Profile(robot, "en", ()))
-    print(f"give to the robot: {token_file} and {data / 'root.json'}")
+    given = [token_file, data / "root.json"]
+    if options.host:
+        certificate = data / "tls" / CERTIFICATE
+        given.append(certificate if certificate.exists() else make_certificate(data / "tls", options.host))
+    print(f"give to the robot: {', '.join(map(str, given))}")
     return 0
 
 

@@ -28,6 +28,8 @@ from rapp_cloud.services.sight import sight_services
 from rapp_cloud.services.voice import voice_services
 from rapp_cloud.shelf import Shelf
 from rapp_cloud.static import store_files
+from rapp_cloud.tls import server_tls
+from rapp_cloud.weblets import weblets
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
 from rapp_hop.registry import ServiceRegistry
@@ -60,11 +62,13 @@ async def running_cloud(config: CloudConfig) -> AsyncIterator[int]:
     workers, robots = Workers(load_interpreter, config.workers), Robots(time.monotonic, config.lease)
     doors = Doors(config.data / "agents", config.data / "uploads", Accounts(config.tokens).robot_of)
     agents = _cloud_agents(config, shelf, robots, doors)
+    tls = server_tls(*config.tls_files) if config.tls_files else None
     server = HopServer(_registry(config, shelf, workers, robots, agents), doors.caller, config.data / "uploads", [
         store_files("/tuf/metadata/", shelf.metadata),
         store_files("/tuf/targets/", shelf.targets),
+        weblets(shelf, "https" if tls else "http"),
         agent_calls(agents),
-    ])  # fmt: skip
+    ], tls=tls)  # fmt: skip
     refreshing = asyncio.create_task(_keep_fresh(shelf, config.refresh))
     try:
         await workers.start()

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from rapp_cloud.tls import CERTIFICATE, KEY, is_loopback
 from rapp_hop.errors import Invalid
 
 FILE = "cloud.toml"
 PREFIX = "RAPP_CLOUD_"
 _TYPES: dict[str, type[Any]] = {
     "address": str, "passphrase": str, "port": int, "workers": int, "agents": int, "agents_of_one": int,
-    "token_file": Path, "passphrase_file": Path,
+    "token_file": Path, "passphrase_file": Path, "certificate": Path, "certificate_key": Path,
 }  # fmt: skip  # others: float
 
 
@@ -24,6 +25,8 @@ class CloudConfig:
     data: Path  # everything the platform keeps
     address: str = "127.0.0.1"  # to listen on
     port: int = 9001  # 0: any free one
+    certificate: Path | None = None  # PEM, for TLS; None: none on loopback, else what `init --host` made
+    certificate_key: Path | None = None  # PEM; None: <data>/tls/key.pem
     token_file: Path | None = None  # None: <data>/tokens.json
     passphrase: str | None = field(default=None, repr=False)  # of the store's keys; only from the environment
     passphrase_file: Path | None = None  # the same out of a file; neither: beside the keys
@@ -39,6 +42,14 @@ class CloudConfig:
     def tokens(self) -> Path:
         """The file of tokens."""
         return self.token_file or self.data / "tokens.json"
+
+    @property
+    def tls_files(self) -> tuple[Path, Path] | None:
+        """Certificate and key; None: this platform speaks plain HTTP, which it does on loopback only."""
+        if self.certificate is None and is_loopback(self.address):
+            return None
+        own = self.data / "tls"
+        return self.certificate or own / CERTIFICATE, self.certificate_key or own / KEY
 
 
 def load_config(data: Path, options: Mapping[str, Any], environment: Mapping[str, str]) -> CloudConfig:

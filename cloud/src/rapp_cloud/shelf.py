@@ -200,12 +200,12 @@ class Shelf:
                 return
         raise Refused(f"cannot find {name} {version}: it is not in the store")
 
-    def file_of(self, name: str) -> tuple[Path, int] | None:
-        """Return where a package on offer lies and its length (bytes), by its file name; None: not on offer."""
+    def file_of(self, path: str) -> Path | None:
+        """Return where a package on offer to everybody lies, by its file name; None: there is none."""
         for targets in self._ledger.read().publishers.values():
-            if name in targets.targets:
-                target = targets.targets[name]
-                return self.targets / f"{target.hashes['sha256']}.{name}", target.length
+            target = targets.targets.get(path)
+            if target is not None and not (target.custom or {}).get("robots"):
+                return self.targets / f"{target.hashes['sha256']}.{path}"
         return None
 
     def _offers(self, lists: Lists) -> Iterator[Offer]:

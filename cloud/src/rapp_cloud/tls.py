@@ -1,0 +1,83 @@
+"""The platform's TLS: a certificate that somebody gave us, or one of our own making that robots are given to trust.
+
+Needed for every address but loopback: what robots send carries their tokens. No trust in packages rests on it.
+"""
+
+import ipaddress
+import ssl
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, generate_private_key
+from cryptography.hazmat.primitives.hashes import SHA256
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from cryptography.x509.oid import NameOID
+
+from rapp_cloud.files import write_whole
+from rapp_hop.errors import Invalid, Refused
+
+CERTIFICATE, KEY = "certificate.pem", "key.pem"
+_LASTS = timedelta(days=3650)
+
+
+def is_loopback(address: str) -> bool:
+    """Tell whether an address to listen on is reached from this computer only."""
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
+
+
+def make_certificate(folder: Path, hosts: Sequence[str]) -> Path:
+    """Make a certificate for these names and addresses, signed by itself, and its key (0600); return the certificate's path.
+
+    The key lies open: the server must read it unattended at each start.
+    """
+    key = generate_private_key(SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, hosts[0][:64])])
+    now = datetime.now(UTC)
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - timedelta(days=1))
+        .not_valid_after(now + _LASTS)
+        .add_extension(x509.SubjectAlternativeName([_name(host) for host in hosts]), critical=False)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .sign(key, SHA256())
+    )
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    secret = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    write_whole(folder / KEY, secret, mode=0o600)
+    write_whole(folder / CERTIFICATE, certificate.public_bytes(Encoding.PEM))
+    return folder / CERTIFICATE
+
+
+def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
+    """Return what to speak TLS with.
+
+    :raises Refused: when a file cannot be read, or others can read the key
+    :raises Invalid: when the two do not belong together
+    """
+    try:
+        if key.stat().st_mode & 0o077:
+            raise Refused(f"cannot use {key}: others can read it, set its mode to 0600")
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.minimum_version = ssl.TLSVersion.TLSv1_2
+        context.load_cert_chain(certificate, key)
+    except ssl.SSLError as error:
+        raise Invalid(f"cannot use {certificate} with {key}: {error.reason}") from None
+    except OSError as error:
+        raise Refused(f"cannot read {certificate} or {key}: {error.strerror}, check both") from None
+    return context
+
+
+def _name(host: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ipaddress.ip_address(host))
+    except ValueError:
+        return x509.DNSName(host)
