@@ -2,7 +2,8 @@
 
 It sees a read-only system, the Python environment, its own package, the recordings of its own run, and one private folder, which
 is of bounded size, in memory, and ends with it. It inherits two descriptors, its channel and the way to its gate, and no
-environment. Its network is its own, and has nothing but a loopback: see `rapp_core.gate`.
+environment. Its network is its own, and has nothing but a loopback: see `rapp_core.gate`. /proc is empty, for in a container none
+can be mounted.
 """
 
 import importlib.util
@@ -57,7 +58,7 @@ def command(folders: RunFolders, limits: Limits, environment: dict[str, str]) ->
     read_only += [(str(folders.package), INSIDE_PACKAGE), (recordings, recordings)]
     words = ["bwrap", "--die-with-parent", "--new-session"]
     words += ["--unshare-ipc", "--unshare-net", "--unshare-pid", "--unshare-uts", "--unshare-cgroup-try"]
-    words += ["--clearenv", "--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp"]
+    words += ["--clearenv", "--tmpfs", "/proc", "--dev", "/dev", "--tmpfs", "/tmp"]
     for folder in _parents([inside for _, inside in read_only]):
         words += ["--perms", "0755", "--dir", folder]  # bubblewrap's own would be closed to other users
     for outside, inside in read_only:
@@ -67,7 +68,7 @@ def command(folders: RunFolders, limits: Limits, environment: dict[str, str]) ->
     words += ["--perms", "1777", "--size", str(limits.private), "--tmpfs", INSIDE_PRIVATE, "--chdir", INSIDE_PRIVATE]
     for name, value in environment.items():
         words += ["--setenv", name, value]
-    for folder in ("/tmp", "/dev", "/"):
+    for folder in ("/tmp", "/proc", "/dev", "/"):
         words += ["--remount-ro", folder]
     return [*words, *_unprivileged(folders.account), *_limited(limits), sys.executable, "-m", RUNNER]
 
