@@ -17,5 +17,6 @@ USER rapp
 VOLUME /data
 EXPOSE 9001
 HEALTHCHECK --interval=5s --timeout=5s --start-period=60s \
- CMD ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:9001/tuf/metadata/timestamp.json', timeout=4)"]
+ CMD ["python", "-c", "import ssl, urllib.request as u; \
+u.urlopen('https://127.0.0.1:9001/tuf/metadata/timestamp.json', timeout=4, context=ssl.create_default_context(cafile='/data/tls/certificate.pem'))"]
 ENTRYPOINT ["docker/cloud"]

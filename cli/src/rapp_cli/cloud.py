@@ -12,6 +12,7 @@ from rapp_cli.errors import CommandError, UsageError
 from rapp_cli.mail_account import MailAccount
 from rapp_cli.paths import STORE
 
+LOOPBACK = ("127.0.0.1", "::1", "localhost")  # where HTTP without encryption is allowed
 USER = "Maria"  # whom the robot serves
 CONTACTS = {
     "Doctor Nowak": "nowak@clinic.example",
@@ -27,6 +28,7 @@ class Cloud:
     url: str
     token_file: Path
     root_file: Path
+    ca_file: Path | None = None  # certificate of a platform of one's own; None: the system's authorities
 
 
 def own_cloud(data: Path, port: int, robot: str) -> Cloud:
@@ -36,10 +38,12 @@ def own_cloud(data: Path, port: int, robot: str) -> Cloud:
 
 def foreign_cloud(url: str, env: Mapping[str, str]) -> Cloud:
     """A platform that runs already; raises UsageError when its address or what it gave this robot is missing."""
-    if urlsplit(url).scheme not in ("http", "https"):
+    parts = urlsplit(url)
+    if parts.scheme != "https" and (parts.scheme != "http" or parts.hostname not in LOOPBACK):
         raise UsageError(f"cannot use {url!r} as a platform: give a URL such as https://rapp.example:9001")
+    ca_file = Path(env["RAPP_CLOUD_CA_FILE"]).absolute() if env.get("RAPP_CLOUD_CA_FILE") else None
     try:
-        return Cloud(url, Path(env["RAPP_TOKEN_FILE"]).absolute(), Path(env["RAPP_ROOT_FILE"]).absolute())
+        return Cloud(url, Path(env["RAPP_TOKEN_FILE"]).absolute(), Path(env["RAPP_ROOT_FILE"]).absolute(), ca_file)
     except KeyError as error:
         raise UsageError(f"cannot use {url} without {error}: set it to the file the platform gave this robot") from None
 
@@ -70,6 +74,7 @@ def link_environment(cloud: Cloud, account: MailAccount) -> dict[str, str]:
         "RAPP_CLOUD": cloud.url,
         "RAPP_TOKEN_FILE": str(cloud.token_file),
         "RAPP_ROOT_FILE": str(cloud.root_file),
+        "RAPP_CLOUD_CA_FILE": str(cloud.ca_file or ""),
         "RAPP_SMTP_HOST": account.host,
         "RAPP_SMTP_PORT": str(account.port),
         "RAPP_SMTP_USER": account.user,

@@ -72,7 +72,7 @@ def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
     except ssl.SSLError as error:
         raise Invalid(f"cannot use {certificate} with {key}: {error.reason}") from None
     except OSError as error:
-        raise Refused(f"cannot read {certificate} or {key}: {error.strerror}, check both") from None
+        raise Refused(f"cannot use {certificate} with {key}: {error.strerror}, run rapp_cloud init --host NAME") from None
     return context
 
 

@@ -43,7 +43,7 @@ class Link:
         _make_home(own)
         self.config = config
         self.boot = uuid.uuid4().hex
-        self.client = TellingClient(config.cloud, config.token or None, self._tell)
+        self.client = TellingClient(config.cloud, config.token or None, self._tell, config.cloud_ca_file)
         reports = Reports(own / "reports")
         outbox = Outbox(own / "outbox", config.mail.waiting)
         self.platform = Platform(self.client, config, reports)

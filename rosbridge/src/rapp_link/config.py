@@ -5,6 +5,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from rapp_hop.errors import Invalid, Refused
 from rapp_link.addresses import check_address
@@ -39,7 +40,8 @@ class Config:
 
     home: Path
     bridge: str = "ws://127.0.0.1:9090"
-    cloud: str = "http://127.0.0.1:9001"
+    cloud: str = "http://127.0.0.1:9001"  # https beyond loopback
+    cloud_ca_file: Path | None = None  # PEM; none: the system's authorities
     token: str = field(default="", repr=False)
     root: bytes = field(default=b"", repr=False)  # trusted root.json of the store
     mail: MailConfig = field(default_factory=MailConfig)
@@ -61,7 +63,8 @@ def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
     return Config(
         home=home,
         bridge=options.bridge,
-        cloud=options.cloud,
+        cloud=_cloud(options.cloud),
+        cloud_ca_file=Path(options.cloud_ca_file) if options.cloud_ca_file else None,
         token=_text(options.token_file, "token file"),
         root=_bytes(options.root_file, "trusted root"),
         mail=_mail(options, env),
@@ -78,6 +81,7 @@ def _parser(env: Mapping[str, str]) -> argparse.ArgumentParser:
 
     option("bridge", Config.bridge, "rosbridge")
     option("cloud", Config.cloud, "platform")
+    option("cloud-ca-file", "", "certificate (PEM) of a platform of your own")
     option("home", data / "rapp", "the robot's data folder")
     option("token-file", "", "file with the robot's token for the platform")
     option("root-file", "", "trusted root.json of the platform's store")
@@ -89,6 +93,14 @@ def _parser(env: Mapping[str, str]) -> argparse.ArgumentParser:
     option("smtp-ca-file", "", "certificate authority (PEM) of a mail server of your own")
     option("mail-from", "", "sender's address; none: the account's name")
     return parser
+
+
+def _cloud(url: str) -> str:
+    """Refuse to send the token in the clear to another computer."""
+    parts = urlsplit(url)
+    if parts.scheme == "http" and parts.hostname not in LOOPBACK:
+        raise Invalid(f"cannot use --cloud {url!r} without encryption: give an https:// address")
+    return url
 
 
 def _mail(options: argparse.Namespace, env: Mapping[str, str]) -> MailConfig:

@@ -26,12 +26,12 @@ Tell = Callable[[str], None]
 class TellingClient(HopClient):
     """Tells what is asked of the platform and what it answers."""
 
-    def __init__(self, base_url: str, token: str | None, tell: Tell) -> None:
+    def __init__(self, base_url: str, token: str | None, tell: Tell, ca_file: Path | None = None) -> None:
         """See `HopClient`.
 
         :param tell: called in the loop
         """
-        super().__init__(base_url, token)
+        super().__init__(base_url, token, ca_file=ca_file)
         self._tell = tell
 
     async def call(
