@@ -4,7 +4,8 @@ from pathlib import Path
 
 from tornado.httpclient import HTTPClientError, HTTPRequest, HTTPResponse
 
-from rapp_hop.client import MAX_ANSWER, socket_connections
+from rapp_hop.client import MAX_ANSWER
+from rapp_hop.connecting import make_connections
 from rapp_hop.errors import Unreachable
 from rapp_hop.protocol import WireAnswer, WireRequest
 
@@ -31,7 +32,7 @@ async def relay(socket_path: Path, request: WireRequest, path: str, timeout: flo
         request_timeout=timeout, connect_timeout=min(timeout, 5.0), follow_redirects=False, decompress_response=False,
         allow_nonstandard_methods=True,
     )  # fmt: skip
-    client = socket_connections(socket_path, max_clients=1, max_buffer_size=MAX_ANSWER)
+    client = make_connections(socket_path, max_clients=1, max_buffer_size=MAX_ANSWER)
     try:
         answer = await client.fetch(outgoing, raise_error=False)
     except (OSError, HTTPClientError, ValueError) as error:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from rapp_hop.errors import HopError, Invalid
 
+REFUSAL = 64 * 1024  # bytes
 Writer = Callable[[bytes], object]
 Progress = Callable[[int, int | None], None]  # bytes so far, bytes announced (None: not announced)
 
@@ -13,6 +14,7 @@ class Sink:
 
     def __init__(self, url: str, write: Writer, limit: int, on_progress: Progress | None) -> None:
         self.received = 0  # bytes
+        self.refusal = b""  # the beginning of the body of an answer that is none
         self.on_piece: Callable[[], object] = lambda: None
         self._url = url
         self._write = write
@@ -39,6 +41,8 @@ class Sink:
 
         What is not wanted is dropped in silence: the client's own bound on size and time ends the transfer.
         """
+        if self._status != 200 and len(self.refusal) < REFUSAL:
+            self.refusal += piece
         if self._status != 200 or self._wrong is not None or self._stopped:
             return
         self.on_piece()
