@@ -1,6 +1,7 @@
 """The system in containers: one platform with its mail server, two robots on networks of their own (docker/compose.yaml)."""
 
 import mailbox
+import ssl
 import threading
 import urllib.error
 import urllib.request
@@ -51,7 +52,7 @@ def subjects(found: list[Message]) -> list[str]:
     return sorted(str(message["From"]) for message in found)
 
 
-def test_each_container_is_unprivileged_and_only_the_platform_is_public(composition: Composition) -> None:
+def test_each_container_is_unprivileged_and_only_the_platform_is_public(composition: Composition, tmp_path: Path) -> None:
     for service in SERVICES:
         known = composition.inspect(service)
         assert known["HostConfig"]["Privileged"] is False
@@ -59,10 +60,12 @@ def test_each_container_is_unprivileged_and_only_the_platform_is_public(composit
         assert not any("docker.sock" in mount["Source"] for mount in known["Mounts"])
         published = [port for port, there in known["NetworkSettings"]["Ports"].items() if there]
         assert published == (["9001/tcp"] if service == "cloud" else [])
-    timestamp = f"http://127.0.0.1:{composition.port}/tuf/metadata/timestamp.json"
-    assert urllib.request.urlopen(timestamp, timeout=10).status == 200
+    composition.docker("cp", f"{composition.container('cloud')}:/data/tls/certificate.pem", str(tmp_path))
+    trust = ssl.create_default_context(cafile=str(tmp_path / "certificate.pem"))
+    platform = f"https://127.0.0.1:{composition.port}"
+    assert urllib.request.urlopen(f"{platform}/tuf/metadata/timestamp.json", timeout=10, context=trust).status == 200
     with pytest.raises(urllib.error.HTTPError, match="401"):
-        urllib.request.urlopen(f"http://127.0.0.1:{composition.port}/hop/list_rapps", timeout=10)
+        urllib.request.urlopen(f"{platform}/hop/list_rapps", timeout=10, context=trust)
 
 
 def test_the_robots_reach_the_platform_and_not_each_other(composition: Composition) -> None:
