@@ -31,6 +31,8 @@ class Robot:
 
     async def register(self, topic: str, kind: str, api: str) -> None:
         self.asked.append(("register", topic, kind, api))
+        if self.away:
+            raise Unreachable("cannot ask the ROS master")
 
     async def unregister(self, topic: str, api: str) -> None:
         self.asked.append(("unregister", topic, api))
@@ -141,6 +143,13 @@ def test_the_robot_hears_of_a_publisher_under_the_gate_s_address_and_with_the_co
     assert subject.master.publishers == {"/rapp_move_to/goal": 4000}
     assert subject.call("unregisterPublisher", ME, "/rapp_move_to/goal", API) == (1, "", 1)
     assert subject.robot.asked[1:] == [("unregister", "/rapp_move_to/goal", GATE)]
+
+
+def test_a_node_may_try_again_when_the_robot_s_master_is_away():
+    subject = Subject("rapp_move_to")
+    subject.robot.away = True
+    with pytest.raises(Unreachable):
+        subject.call("registerPublisher", ME, "/rapp_move_to/goal", "*", API)
 
 
 @pytest.mark.parametrize("api", ["", "http://127.0.0.1/", "http://127.0.0.1:99999/", "nonsense", "http://[::1", 7])

@@ -54,7 +54,7 @@ class Master:
         }
 
     async def answer(self, method: str, words: list[Any]) -> Outcome:
-        """See `questions.Answerer`."""
+        """See `questions.Answerer`. Raises Unreachable when the robot's master is away: a node then tries again."""
         answerer = self._methods.get(method)
         if answerer is None or not words or not isinstance(words[0], str):
             return self.refuse(f"refused: cannot {method}: a RApp may not")
@@ -62,8 +62,6 @@ class Master:
             return await answerer(*words)
         except TypeError:
             return -1, f"cannot {method}: these are not its words", 0
-        except Unreachable as error:
-            return -1, str(error), 0
 
     def refuse(self, text: str) -> Outcome:
         """An answer that something is not allowed; noted in the log."""
@@ -99,8 +97,11 @@ class Master:
         return self.refuse(f"refused: cannot offer {name}: a RApp offers no services")
 
     async def _lookup_service(self, _caller: str, name: str) -> Outcome:
-        if not self.rules.service(name):
-            await self._upstream.service(name)
+        try:
+            if not self.rules.service(name):
+                await self._upstream.service(name)
+        except Unreachable as error:
+            return -1, str(error), 0
         return 1, "", f"rosrpc://{LOOPBACK}:{self._relay}"
 
     async def _request_topic(self, _caller: str, topic: str, _protocols: list[Any]) -> Outcome:

@@ -12,7 +12,7 @@ from tornado.httpserver import HTTPServer
 from tornado.httputil import HTTPHeaders, HTTPServerRequest, ResponseStartLine
 from tornado.iostream import IOStream
 
-from rapp_core.errors import Invalid
+from rapp_core.errors import Invalid, Unreachable
 from rapp_core.gate.bounds import QUESTION_RATE, QUESTIONS, XML, Pace
 from rapp_core.gate.inside import check_plain
 
@@ -67,6 +67,8 @@ class Questions(HTTPServer):
             body = xmlrpc.client.dumps((answer,), methodresponse=True, allow_none=True).encode()
         except Invalid as error:
             code, body = 400, str(error).encode()
+        except Unreachable as error:
+            code, body = 503, str(error).encode()
         headers = HTTPHeaders({"Content-Type": "text/xml", "Content-Length": str(len(body))})
         connection = request.connection
         if connection is not None:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 from rapp_core.errors import Bug
 
@@ -26,28 +27,36 @@ def adopt_orphans() -> None:
 class Confined:
     """bubblewrap (our child) and the first process of its namespace, whose end is the end of all others in there."""
 
-    def __init__(self, words: list[str], passed: Sequence[int], log: int) -> None:
+    def __init__(self, words: list[str], passed: Sequence[int], log: int, account: int | None = None) -> None:
         """Start the sandbox with some descriptors passed in. Raises Bug.
 
+        `account`: user id that root gives the sandbox's user namespace beside its own; others have just their own there.
         Call it from a thread that lives as long as this process: --die-with-parent means the starting thread.
         """
         told, tell = os.pipe()
+        held, hold = os.pipe()  # bubblewrap waits at it for the ids that only we may give
+        waits = [] if account is None else ["--userns-block-fd", str(held)]
         try:
             self._process = subprocess.Popen(
-                [words[0], "--info-fd", str(tell), *words[1:]],
+                [words[0], "--info-fd", str(tell), *waits, *words[1:]],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                pass_fds=(*passed, tell),
+                pass_fds=(*passed, tell, held),
                 start_new_session=True,
                 env={"PATH": os.environ.get("PATH", os.defpath)},
             )
         except OSError as error:
-            os.close(told)
+            for each in (told, hold):
+                os.close(each)
             raise Bug(f"cannot start the sandbox: {error}; install the Debian package bubblewrap") from error
         finally:
-            os.close(tell)
+            for each in (tell, held):
+                os.close(each)
         self.first = _first_process(told)
+        if account is not None and self.first is not None:
+            _give(self.first, account)
+        os.close(hold)
         self._handle: int | None = None
         with contextlib.suppress(OSError):  # it may have ended already
             if self.first is not None:
@@ -96,6 +105,16 @@ class Confined:
         if self.first is not None:
             with contextlib.suppress(ChildProcessError):  # bubblewrap has reaped it itself
                 os.waitpid(self.first, os.WNOHANG)
+
+
+def _give(pid: int, account: int) -> None:
+    """Let a new user namespace have root's id and the account's (user_namespaces(7)).
+
+    A process that has ended meanwhile is seen to have ended by whoever waits for it.
+    """
+    with contextlib.suppress(OSError):
+        for kind in ("uid", "gid"):
+            Path(f"/proc/{pid}/{kind}_map").write_text(f"0 0 1\n{account} {account} 1\n")
 
 
 def _first_process(told: int) -> int | None:

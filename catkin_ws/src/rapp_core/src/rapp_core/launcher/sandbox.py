@@ -92,12 +92,13 @@ def _python() -> list[str]:
 
 
 def _unprivileged(account: int | None) -> list[str]:
-    """Root becomes the run's account inside, or the limit on processes would not bind; others get a user namespace."""
+    """All get a user namespace; root becomes the run's account in it, or the limit on processes would not bind."""
     if account is None:
         return ["--unshare-user", "--uid", NOBODY, "--gid", NOBODY]
+    own = ["--unshare-user", "--uid", "0", "--gid", "0"]
     drop = ["setpriv", "--reuid", str(account), "--regid", str(account), "--clear-groups"]
     drop += ["--inh-caps", "-all", "--no-new-privs"]
-    return ["--cap-drop", "ALL", "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", *drop]
+    return [*own, "--cap-drop", "ALL", "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID", *drop]
 
 
 def _limited(limits: Limits) -> list[str]:
