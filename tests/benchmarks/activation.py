@@ -33,7 +33,7 @@ import soundfile
 from phases import FIRST_CALL, ORDER, SPEECH_ENDED, UNDERSTOOD, Marks, Stamp, between, marks, timeline
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-from rapp_cli.demo.config import DemoConfig
+from rapp_cli.demo.config import add_options, read
 from rapp_cli.demo.system import System, running_system
 from rapp_cli.timeline import KINDS
 from rapp_nao_sim.sound.synthesis import RATE, speak
@@ -130,7 +130,9 @@ def speech(text: str, file: Path) -> Path:
 @asynccontextmanager
 async def stage(folder: Path) -> AsyncIterator[Stage]:
     """Everything running; ended afterwards."""
-    config = DemoConfig(folder, "", "Elizabeth", "", VOICE, None, None, None, "elizabeth@home.example", 0.0)
+    options = argparse.ArgumentParser()
+    add_options(options)
+    config = read(options.parse_args(["--folder", str(folder), "--voice", VOICE]), {})
     sounds = {way: speech(text, folder / f"{way}.wav") for way, text in SAID.items()}
     async with running_system(config) as system:
         witness, session = Witness(), qi.Session()
