@@ -146,6 +146,11 @@ class SimWorld(SimBody):
         self.__there().load_room(Path(name))
 
     @working
+    def startAt(self, name: str) -> None:  # noqa: N802
+        """Put the robot at one of the places that the room file has as `starts`, standing as at the start."""
+        self.__there().start_at(name)
+
+    @working
     def photograph(self, name: str) -> None:
         """Write a picture of the room as a PNG file."""
         self.__there().photograph(Path(name))

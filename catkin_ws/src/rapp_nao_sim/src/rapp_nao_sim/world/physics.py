@@ -58,6 +58,7 @@ class Physics:
         self._furnishing = Furnishing(bullet, plan, self._body.touches, self._wake)
         self._motion = Motion(bullet, self._body, known, self._service.answer)
         self._motion.begin(name, (start.x, start.y), start.theta)
+        self._plan = plan
         self._senses = Senses(bullet, self._body, self._motion, self._service.answer)
         self._touching = Touching(self._body, self._furnishing.names)
         self._service.offer(self._commands())
@@ -109,6 +110,7 @@ class Physics:
             "push": self._push,
             "take_touched": self._touching.take,
             "load_room": self._load_room,
+            "start_at": self._start_at,
             "snapshot": self._snapshot,
             "events": later(self._senses.listen),
             **self._senses.commands(),
@@ -172,7 +174,17 @@ class Physics:
         self._motion.stop()
         self._furnishing.furnish(plan)
         self._motion.begin(start.posture, (start.x, start.y), start.theta)
+        self._plan = plan
         return plan
+
+    def _start_at(self, name: str) -> None:
+        places = {place.name: place for place in self._plan.starts}
+        if name not in places:
+            raise Refused(f"cannot start at {name!r}: the room's places are {', '.join(places) or 'none'}")
+        place = places[name]
+        self._motion.stop()
+        self._motion.begin(self._plan.robot.posture, (place.x, place.y), place.theta)
+        self._wake()
 
     def _wake(self) -> None:
         """Let the physics go on after a change."""

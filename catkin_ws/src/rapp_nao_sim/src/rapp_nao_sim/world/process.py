@@ -110,6 +110,10 @@ class WorldClient(BodyClient):
         """Have another room, with the robot at its start; raises Invalid for a wrong room file."""
         self._views.show(lambda: self._room("load_room", file))
 
+    def start_at(self, name: str) -> None:
+        """Put the robot at one of the room's `starts`, in its first posture."""
+        self._physics.call("start_at", name)
+
     def photograph(self, path: Path | str) -> None:
         """Write a picture of the room as a PNG file; the physics goes on meanwhile."""
         _write(Path(path), self._views.overview(self._config.width, self._config.height))

@@ -45,6 +45,16 @@ class Start:
 
 
 @dataclass(frozen=True)
+class StartPlace:
+    """Another place from which the robot may start."""
+
+    name: str
+    x: float
+    y: float
+    theta: float
+
+
+@dataclass(frozen=True)
 class Door:
     """A leaf that turns about a vertical hinge."""
 
@@ -148,9 +158,12 @@ class Room:
     cylinders: tuple[Cylinder, ...] = ()
     pictures: tuple[Picture, ...] = ()
     people: tuple[Person, ...] = ()
+    starts: tuple[StartPlace, ...] = ()
 
 
-_LISTS: dict[str, type[Any]] = {"walls": Wall, "boxes": Box, "cylinders": Cylinder, "pictures": Picture, "people": Person}
+_LISTS: dict[str, type[Any]] = {
+    "walls": Wall, "boxes": Box, "cylinders": Cylinder, "pictures": Picture, "people": Person, "starts": StartPlace,
+}  # fmt: skip
 _TABLES: dict[str, type[Any]] = {"floor": Floor, "light": Light, "robot": Start, "door": Door, "overview": Overview}
 
 
