@@ -11,7 +11,7 @@ from rapp_nao_sim.world import room as rooms
 from rapp_nao_sim.world.body import Body
 from rapp_nao_sim.world.bullet import connect
 from rapp_nao_sim.world.cameras import BGR, SIZES, defaults
-from rapp_nao_sim.world.frames import WORLD, Stance, gaze, transform
+from rapp_nao_sim.world.frames import ROBOT, WORLD, Stance, gaze, transform
 from rapp_nao_sim.world.postures import load
 from rapp_nao_sim.world.renderer import Renderer
 from rapp_nao_sim.world.things import things
@@ -19,6 +19,8 @@ from rapp_nao_sim.world.things import things
 Image = NDArray[np.uint8]
 Point = tuple[float, float, float]
 VGA, QUAD_VGA = 2, 3
+LEAN = 0.1  # rad that the torso leans ahead in StandInit
+UP = (-math.sin(LEAN), 0.0, math.cos(LEAN))
 
 
 class _NoService:
@@ -49,8 +51,8 @@ class RenderedRoom:
         head: tuple[float, float] = (0.0, 0.0),
     ) -> Image:
         """Blue, green, red of what is seen from x, y, theta when looking at a point of the room, or with the head so."""
-        angles = self._angles | dict(zip(("HeadYaw", "HeadPitch"), self._gaze(stand, look) if look else head, strict=True))
-        lean = (0.0, math.sin(0.05), 0.0, math.cos(0.05))
+        angles = self._turned(self.gaze(stand, look) if look else head)
+        lean = (0.0, math.sin(LEAN / 2), 0.0, math.cos(LEAN / 2))
         turn = (0.0, 0.0, math.sin(stand[2] / 2), math.cos(stand[2] / 2))
         self._body.put(angles, _times(turn, lean), stand[:2])
         position, orientation = self._body.base()
@@ -66,10 +68,17 @@ class RenderedRoom:
         width, height = SIZES[resolution]
         return np.frombuffer(data, np.uint8).reshape(height, width, 3)
 
-    def _gaze(self, stand: tuple[float, float, float], look: Point) -> tuple[float, float]:
-        up = (-math.sin(0.1), 0.0, math.cos(0.1))
-        torso = transform("Torso", WORLD, Stance(self._angles, up, stand))
+    def gaze(self, stand: tuple[float, float, float], look: Point) -> tuple[float, float]:
+        """HeadYaw and HeadPitch that bring a point of the room into the picture's middle."""
+        torso = transform("Torso", WORLD, Stance(self._angles, UP, stand))
         return gaze((np.linalg.inv(torso) @ [*look, 1.0])[:3].tolist())
+
+    def camera(self, head: tuple[float, float]) -> NDArray[np.float64]:
+        """The top camera in the robot's frame, as rapp_get_transform gives it."""
+        return transform("CameraTop", ROBOT, Stance(self._turned(head), UP, (0.0, 0.0, 0.0)))
+
+    def _turned(self, head: tuple[float, float]) -> dict[str, float]:
+        return self._angles | dict(zip(("HeadYaw", "HeadPitch"), head, strict=True))
 
 
 def _times(a: Any, b: Any) -> tuple[float, float, float, float]:

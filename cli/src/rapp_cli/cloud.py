@@ -64,8 +64,8 @@ def write_profile(path: Path, contacts: Mapping[str, str]) -> None:
 
 
 def own_rapps() -> list[Path]:
-    """Sources of the RApps that come with the repository."""
-    return [folder for folder in sorted(STORE.iterdir()) if folder.is_dir()]
+    """Sources of the packages that come with the repository; a four-agent RApp has two."""
+    return sorted(file.parent for pattern in ("*/package.json", "*/*/package.json") for file in STORE.glob(pattern))
 
 
 def link_environment(cloud: Cloud, account: MailAccount) -> dict[str, str]:

@@ -82,7 +82,7 @@ def _hinged(leaf: Outline, wall: Wall, picture: Level) -> float:
 
 
 def _solid(leaf: Outline, wall: Wall, edges: Edges) -> float:
-    """Whether what lies in the wall's plane is a leaf, and ends at the floor as clearly as the wall: a doorway, at a seam, does not."""
+    """Whether what lies in the wall's plane is a leaf, and ends at the floor as clearly as the wall; a seam is fainter."""
     if wall.foot is None or _between(math.atan(leaf.t), wall.direction) > CLOSED:
         return 1.0
     if leaf.weakest < WHOLE:
