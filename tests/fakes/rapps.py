@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from fakes.cloud_agents import write_cloud_agent
+
 AGENT = """from rapp_api import DynamicAgent, cloud, communication
 
 
@@ -45,3 +47,12 @@ def install_rapp(home: Path, name: str, body: str = "pass", **rapp: Any) -> Path
     folder = write_rapp(home / "rapps" / name / "1.0.0", name, body, **rapp)
     (folder.parent / "current").symlink_to("1.0.0")
     return folder
+
+
+def write_four_agent_rapp(folder: Path, name: str, body: str, program: str, cloud: tuple[str, ...] = (), **rapp: Any) -> list[Path]:
+    """The two packages of a four-agent RApp; `program` is its cloud agent's, which may call the platform's services `cloud`."""
+    dynamic = write_rapp(folder / name / "dynamic", name, body, partner=f"{name}_cloud", **rapp)
+    return [
+        dynamic,
+        write_cloud_agent(folder / name / "cloud", f"{name}_cloud", program, permissions={"core": [], "cloud": list(cloud)}),
+    ]

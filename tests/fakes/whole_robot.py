@@ -254,6 +254,18 @@ class WholeRobot:
             assert time.monotonic() < deadline, f"left running: {runs} {sandboxes} {gates}"
             time.sleep(0.1)
 
+    def until_only_the_cloud_spare_runs(self) -> None:
+        """Wait until no cloud agent is left at the platform but the warm spare."""
+        deadline = time.monotonic() + PATIENCE
+        runs = self.data / "agents" / "runs"
+        while True:
+            used = list(runs.glob("*/package/*"))
+            sandboxes = {words for words in processes_of(runs) if words.startswith("bwrap")}
+            if not used and len(sandboxes) <= 1:
+                return
+            assert time.monotonic() < deadline, f"left running: {used} {sandboxes}"
+            time.sleep(0.1)
+
     def said(self, since: int = 0) -> list[str]:
         """What the robot has said."""
         return [seen.detail for seen in self.seen[since:] if seen.kind == "said"]

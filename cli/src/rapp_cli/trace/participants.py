@@ -10,6 +10,7 @@ NAMES = {
     "dynamic": "dynamic agent",
     "link": "link",
     "repository": "repository agent",
+    "cloud-agent": "cloud agent",
     "mail-server": "cloud agent (mail server)",
 }
 _BEFORE_MODULES = ("person", "core")
