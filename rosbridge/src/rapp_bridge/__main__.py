@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 def main() -> int:
     """Run the bridge; gives the exit status."""
     config = read(sys.argv[1:], os.environ)
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s", stream=sys.stderr)
+    _log_to_stderr()
     try:
         gate = Gate(read_tokens(Path(config.access_file).read_text()) if config.access_file else {}, time.time)
         tls = _tls(config)
@@ -46,6 +46,12 @@ def main() -> int:
         _log.warning("the ROS master does not take the farewell; leaving without")
         os._exit(0)  # rospy's own exit handler would wait for the master without bound
     return 0
+
+
+def _log_to_stderr() -> None:
+    """rospy puts its own handlers in place when it joins, so it is called again then."""
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s", stream=sys.stderr, force=True)
+    logging.getLogger("rospy").setLevel(logging.WARNING)
 
 
 def _make_room(descriptors: int) -> None:
@@ -78,6 +84,7 @@ async def _serve(config: Config, gate: Gate, tls: ssl.SSLContext | None) -> None
     await _first(joining, stop)
     if not stop.is_set():
         joining.result()
+        _log_to_stderr()
         rospy.on_shutdown(lambda: None if loop.is_closed() else loop.call_soon_threadsafe(stop.set))
         await _serve_joined(config, bridge, tls, stop)
         await asyncio.wait([asyncio.create_task(blocking.run(rospy.signal_shutdown, "bridge ends"))], timeout=LEAVE)

@@ -8,6 +8,9 @@ from rapp_bridge.errors import Refused
 from rapp_bridge.handshake import TurnedAwayError
 from rapp_bridge.server import Connection, Hall
 
+CROWD = 100  # clients above the limit that are told so; more are cut off without a word
+MOMENT = 1.0  # s that one who is turned away has to ask, or to read why
+
 
 class Doorway(asyncio.Protocol):
     """A connection until its handshake is done; it has a bounded time, and a bounded number of others beside it."""
@@ -21,9 +24,12 @@ class Doorway(asyncio.Protocol):
         self._transport = transport
         config = self._hall.config
         self._hall.sockets.add(transport)
-        self._timer = asyncio.get_running_loop().call_later(config.entry_timeout, self._is_late)
-        if len(self._hall.sockets) > config.clients:
-            self._turn_away(TurnedAwayError("503 Service Unavailable", "cannot serve more clients; try again later"))
+        excess = len(self._hall.sockets) - config.clients
+        self._is_full = excess > 0
+        seconds = min(config.entry_timeout, MOMENT) if self._is_full else config.entry_timeout
+        self._timer = asyncio.get_running_loop().call_later(seconds, self._is_late)
+        if excess > CROWD:
+            transport.abort()
 
     def connection_lost(self, _error: Exception | None) -> None:
         """The client is gone before it was let in."""
@@ -39,6 +45,8 @@ class Doorway(asyncio.Protocol):
                 if len(self._head) > handshake.LIMIT:
                     raise TurnedAwayError("431 Request Header Fields Too Large", "cannot read so long a request")
                 return
+            if self._is_full:
+                raise TurnedAwayError("503 Service Unavailable", "cannot serve more clients; try again later")
             self._let_in(handshake.answer(self._head[:end], self._hall.config.origin), self._head[end + len(handshake.END) :])
         except TurnedAwayError as error:
             self._turn_away(error)
@@ -60,7 +68,7 @@ class Doorway(asyncio.Protocol):
 
     def _turn_away(self, error: TurnedAwayError) -> None:
         self._timer.cancel()
-        self._timer = asyncio.get_running_loop().call_later(1.0, self._transport.abort)
+        self._timer = asyncio.get_running_loop().call_later(MOMENT, self._transport.abort)
         self._transport.write(error.response)
         self._transport.close()
         self._head = b""

@@ -88,6 +88,7 @@ class AdvertiseService:
 
     service: str
     type: str
+    id: Id = None
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,7 @@ class UnadvertiseService:
     """The client answers calls of `service` no longer."""
 
     service: str
+    id: Id = None
 
 
 @dataclass(slots=True)

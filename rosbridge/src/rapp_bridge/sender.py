@@ -9,7 +9,7 @@ from rapp_bridge.arrival import Arrival, Background, Wire
 from rapp_bridge.errors import BridgeError
 from rapp_bridge.outbox import Outbox
 from rapp_bridge.protocol import Level
-from rapp_bridge.websocket import POLICY, Frame, close_frame
+from rapp_bridge.websocket import NORMAL, POLICY, Frame, close_frame
 
 HIGH_WATER = 1 << 18  # bytes given to the system at once; what waits beyond them can still be dropped
 TOLD_AGAIN = 1.0  # s between statuses about messages that could not be sent
@@ -86,11 +86,18 @@ class Sender:
         self._flush()
 
     def farewell(self, code: int, reason: str) -> None:
-        """Send a close frame as the last one."""
+        """Send a close frame as the last one.
+
+        Unless the client asked for it, the socket stays open on its side: closed over bytes of it that nobody has read, it would
+        be reset, and the reason with it.
+        """
         if not self._closed:
             self._write(close_frame(code, reason))
             self.close()
-            self._transport.close()
+            if code != NORMAL and self._transport.can_write_eof():
+                self._transport.write_eof()
+            else:
+                self._transport.close()
 
     def close(self) -> None:
         """Send nothing more."""

@@ -141,6 +141,8 @@ class Connection(asyncio.Protocol):
         """Say farewell; a client that does not answer it is cut off."""
         if not self._over:
             self._over = True
+            self._received.clear()
+            self._read_on(True)
             self._sender.farewell(code, reason)
             self._timer.cancel()
             self._timer = self._loop.call_later(self._hall.config.entry_timeout, self._transport.abort)
