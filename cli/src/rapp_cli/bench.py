@@ -12,6 +12,7 @@ SUBJECTS = {
     "speech": "speech.py",
     "interpret": "interpret.py",
     "bridge": "bridge.py",
+    "hop": "hop.py",
     "robot": "robot.py",
 }
 """Subject to program."""
