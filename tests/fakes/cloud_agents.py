@@ -43,7 +43,7 @@ async def run_in_loop(code: str) -> Any:
     return space.get("facts")
 
 
-@service
+@service(max_body=16 * 2**20)
 def measure(picture: Path, times: int = 1) -> dict:
     return {"size": picture.stat().st_size * times, "ending": picture.suffix}
 """
