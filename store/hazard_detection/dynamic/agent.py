@@ -33,6 +33,7 @@ from rapp_api import (
 
 _log = logging.getLogger(__name__)
 Image = NDArray[np.uint8]
+Point = tuple[float, float, float]
 
 AROUND = (0.0, 0.9, 1.8, -0.9, -1.8)  # rad of the neck, that show together nearly everything round the robot
 UP = -0.1  # rad of the head's pitch while it looks for codes
@@ -56,9 +57,9 @@ class HazardDetection(DynamicAgent):
     def __init__(self, parameters: dict[str, Any] | None = None) -> None:
         super().__init__(parameters)
         self._codes = codes_of(self.parameters["codes"])
-        self._places: list[dict[str, Any]] = self.parameters["places"]
-        self._stands = {place["name"]: list(place["stands"]) for place in self._places}
-        self._ahead = [place["name"] for place in self._places]  # where to look yet
+        self._looks: dict[str, Point] = self.parameters["looks"]  # of each place what to look at, in the map
+        self._stands = {name: list(stands) for name, stands in self.parameters["stands"].items()}  # where to stand, one by one
+        self._ahead = list(self._looks)  # where to look yet
         self._pictures: dict[str, Path] = {}
         self._found: dict[str, dict[str, Any]] = {}
         self._folder = Path(tempfile.mkdtemp(prefix="hazard-"))
@@ -136,7 +137,7 @@ class HazardDetection(DynamicAgent):
     def _walk(self, _share: Subsystem) -> None:
         name = self._ahead[0]
         x, y = self._stands[name].pop(0)
-        look = self._place(name)["look"]
+        look = self._looks[name]
         say(f"I go to the {name}")
         try:
             navigation.move_along_path([Pose(x, y, math.atan2(look[1] - y, look[0] - x))])
@@ -146,7 +147,7 @@ class HazardDetection(DynamicAgent):
 
     def _look(self, _share: Subsystem) -> None:
         name = self._ahead.pop(0)
-        point = self._place(name)["look"]
+        point = self._looks[name]
         x, y, z = _seen_from(navigation.get_robot_pose(), point)
         side = math.atan2(y, x)
         try:
@@ -221,9 +222,6 @@ class HazardDetection(DynamicAgent):
             return
         say(f"I have written to {carer['name']}" if state == "delivered" else f"I write to {carer['name']} later")
 
-    def _place(self, name: str) -> dict[str, Any]:
-        return next(place for place in self._places if place["name"] == name)
-
     def _written(self, name: str, picture: Image) -> Path:
         path = self._folder / f"{name}.jpg"
         path.write_bytes(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes())
@@ -243,7 +241,7 @@ def _taken(resolution: int) -> Image | None:
     return None
 
 
-def _seen_from(pose: Pose, point: tuple[float, float, float]) -> tuple[float, float, float]:
+def _seen_from(pose: Pose, point: Point) -> Point:
     """A point of the map in the frame of a robot at a pose; the height stays."""
     x, y = point[0] - pose.x, point[1] - pose.y
     cos, sin = math.cos(pose.theta), math.sin(pose.theta)

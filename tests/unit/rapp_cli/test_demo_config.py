@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rapp_cli.demo.config import KEYWORDS, SENTENCES, SHOW_AROUND, VOICE_MAIL, DemoConfig, add_options, read
+from rapp_cli.demo.config import HAZARD, KEYWORDS, SENTENCES, SHOW_AROUND, VOICE_MAIL, DemoConfig, add_options, read
 from rapp_cli.errors import UsageError
 
 
@@ -56,14 +56,28 @@ def test_a_story_has_its_own_words() -> None:
 
 
 @pytest.mark.parametrize(
-    "words",
+    ("words", "said"),
     [
-        ("--obstacle",),
-        (VOICE_MAIL, "--silent"),
-        (SHOW_AROUND, "--obstacle", "--robot", "tcp://nao.local:9559"),
-        (SHOW_AROUND, "--silent", "--long"),
+        (("--obstacle",), "--obstacle with voice-mail: it is for show-around"),
+        ((VOICE_MAIL, "--silent"), "--silent with voice-mail: it is for show-around and hazard"),
+        ((HAZARD, "--obstacle"), "--obstacle with hazard"),
+        ((SHOW_AROUND, "--door", "0"), "--door with show-around: it is for hazard"),
+        ((SHOW_AROUND, "--light", "off"), "--light with show-around"),
+        ((VOICE_MAIL, "--mail"), "--mail with voice-mail"),
+        ((SHOW_AROUND, "--start", "table"), "--start with show-around"),
+        ((SHOW_AROUND, "--obstacle", "--robot", "tcp://nao.local:9559"), "--obstacle with a real robot"),
+        ((HAZARD, "--door", "40", "--robot", "tcp://nao.local:9559"), "--door with a real robot"),
+        ((SHOW_AROUND, "--silent", "--long"), "leave out --silent or --long"),
+        ((HAZARD, "--door", "120"), "by 120 degrees: give 0 to 90"),
     ],
 )
-def test_options_of_the_tour_that_cannot_be_met_are_refused(words: tuple[str, ...]) -> None:
-    with pytest.raises(UsageError, match="--silent"):
+def test_options_that_cannot_be_met_are_refused(words: tuple[str, ...], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
         config(*words)
+
+
+def test_door_and_light_are_as_wished() -> None:
+    assert (config(HAZARD).door, config(HAZARD).light, config(HAZARD).write) == (40, True, False)
+    wished = config(HAZARD, "--door", "0", "--light", "off", "--mail", "--start", "table")
+    assert (wished.door, wished.light, wished.write, wished.start) == (0, False, True, "table")
+    assert (wished.timeout, config().timeout, config("--timeout", "7").timeout) == (300, 180, 7)

@@ -7,7 +7,8 @@ import sys
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-from rapp_cli.demo.config import SHOW_AROUND, VOICE_MAIL, DemoConfig, add_options, read
+from rapp_cli.demo.config import HAZARD, SHOW_AROUND, VOICE_MAIL, DemoConfig, add_options, read
+from rapp_cli.demo.hazard import Hazard
 from rapp_cli.demo.show_around import ShowAround
 from rapp_cli.demo.story import Story
 from rapp_cli.demo.system import System, running_system
@@ -18,7 +19,11 @@ from rapp_cli.timeline import Entry, Timeline, follow
 
 __all__ = ["add_options", "run"]
 
-STORIES: dict[str, Callable[[DemoConfig, System], Story]] = {VOICE_MAIL: VoiceMail, SHOW_AROUND: ShowAround}
+STORIES: dict[str, Callable[[DemoConfig, System], Story]] = {
+    VOICE_MAIL: VoiceMail,
+    SHOW_AROUND: ShowAround,
+    HAZARD: Hazard,
+}
 
 
 def run(options: argparse.Namespace) -> int:

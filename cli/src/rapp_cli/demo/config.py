@@ -13,16 +13,23 @@ from rapp_cli import mail_account
 from rapp_cli.errors import UsageError
 from rapp_cli.mail_account import MailAccount
 
-VOICE_MAIL, SHOW_AROUND = "voice-mail", "show-around"
-KEYWORDS = {VOICE_MAIL: "e-mail", SHOW_AROUND: "show me around"}
-SENTENCES = {VOICE_MAIL: "I would like to send a message to my daughter", SHOW_AROUND: "please take me on a tour of your room"}
+VOICE_MAIL, SHOW_AROUND, HAZARD = "voice-mail", "show-around", "hazard"
+KEYWORDS = {VOICE_MAIL: "e-mail", SHOW_AROUND: "show me around", HAZARD: "is everything safe"}
+SENTENCES = {
+    VOICE_MAIL: "I would like to send a message to my daughter",
+    SHOW_AROUND: "please take me on a tour of your room",
+    HAZARD: "please look whether I have left the door open",
+}
+TIMEOUTS = {HAZARD: 300.0}  # s for the whole story, where it is not TIMEOUT
+TIMEOUT = 180.0
+WIDEST = 90.0  # degrees to which the door opens
 
 
 @dataclass(frozen=True)
 class DemoConfig:
     """One run of the demo."""
 
-    story: str  # VOICE_MAIL or SHOW_AROUND
+    story: str  # one of KEYWORDS
     folder: Path  # everything the run writes
     command: str  # what the person says first
     recipient: str  # the name the person says
@@ -35,6 +42,10 @@ class DemoConfig:
     timeout: float  # s, for the whole story
     obstacle: bool  # something stands in the way of the tour
     silent: bool  # the simulated robot is fed with text, and speaks without sound
+    door: float = 40.0  # degrees to which the door stands open
+    light: bool = True  # whether the lamp is on
+    write: bool = False  # whether the carer is to be written to
+    start: str = ""  # the place of the room where the robot starts; "": its usual one
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -51,9 +62,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--voice", default="en-us+m3", help="espeak-ng voice of the person (%(default)s)")
     parser.add_argument("--obstacle", action="store_true", help="show-around: put a carton in the robot's way")
-    parser.add_argument("--silent", action="store_true", help="show-around: words go as text in place of sound")
+    parser.add_argument("--silent", action="store_true", help="words go as text in place of sound; not with voice-mail")
+    hazard = parser.add_argument_group("hazard")
+    hazard.add_argument("--door", type=float, metavar="DEGREES", help="how far the door stands open, 0 to 90 (40)")
+    hazard.add_argument("--light", choices=("on", "off"), help="whether the lamp is on (on)")
+    hazard.add_argument("--mail", action="store_true", help="the person wants the recipient to be told")
+    hazard.add_argument("--start", metavar="PLACE", help="where in the room the robot starts, such as window, table, chair")
     parser.add_argument("--folder", type=Path, help="where the run writes (default: a new folder among your data)")
-    parser.add_argument("--timeout", type=float, default=180.0, help="seconds for the whole story (%(default)s)")
+    parser.add_argument("--timeout", type=float, help=f"seconds for the whole story ({TIMEOUT:g}, hazard {TIMEOUTS[HAZARD]:g})")
     real = parser.add_argument_group("real equipment")
     real.add_argument("--robot", metavar="URL", help="NAOqi of a real NAO, such as tcp://nao.local:9559 [RAPP_ROBOT]")
     real.add_argument("--cloud", metavar="URL", help="a running platform [RAPP_CLOUD; RAPP_TOKEN_FILE, RAPP_ROOT_FILE]")
@@ -66,7 +82,7 @@ def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> De
     account = mail_account.read(options, env)
     if account and not options.address:
         raise UsageError("cannot use a real mail account without a real recipient: give --address NAME@DOMAIN")
-    _check_tour(options, env)
+    _check_story(options, env)
     if not options.recipient.strip() or not options.message.strip():
         raise UsageError("cannot send a voice-mail without --recipient and --message")
     return DemoConfig(
@@ -80,20 +96,35 @@ def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> De
         cloud=options.cloud or env.get("RAPP_CLOUD"),
         mail=account,
         address=options.address or f"{_mailbox(options.recipient)}@home.example",
-        timeout=options.timeout,
+        timeout=options.timeout or TIMEOUTS.get(options.story, TIMEOUT),
         obstacle=options.obstacle,
         silent=options.silent,
+        door=DemoConfig.door if options.door is None else options.door,
+        light=options.light != "off",
+        write=options.mail,
+        start=options.start or "",
     )
 
 
-def _check_tour(options: argparse.Namespace, env: Mapping[str, str]) -> None:
-    tour = options.story == SHOW_AROUND
-    if (options.obstacle or options.silent) and not tour:
-        raise UsageError(f"cannot use --obstacle or --silent with {options.story}: they are for {SHOW_AROUND}")
-    if (options.obstacle or options.silent) and (options.robot or env.get("RAPP_ROBOT")):
-        raise UsageError("cannot use --obstacle or --silent with a real robot: put something in its way yourself")
+def _check_story(options: argparse.Namespace, env: Mapping[str, str]) -> None:
+    """Options that the story does not have, or a real robot cannot meet."""
+    given = {
+        SHOW_AROUND: {"--obstacle": options.obstacle, "--silent": options.silent},
+        HAZARD: {
+            "--door": options.door is not None, "--light": options.light, "--start": options.start, "--mail": options.mail,
+            "--silent": options.silent,
+        },
+    }  # fmt: skip
+    for option in sorted({name for known in given.values() for name, wished in known.items() if wished}):
+        stories = [story for story, known in given.items() if option in known]
+        if options.story not in stories:
+            raise UsageError(f"cannot use {option} with {options.story}: it is for {' and '.join(stories)}")
+        if options.robot or env.get("RAPP_ROBOT"):
+            raise UsageError(f"cannot use {option} with a real robot: it is for the simulated room; see to it yourself")
     if options.silent and options.long:
         raise UsageError("cannot interpret a sentence without its sound: leave out --silent or --long")
+    if options.door is not None and not 0 <= options.door <= WIDEST:
+        raise UsageError(f"cannot open the door by {options.door:g} degrees: give 0 to {WIDEST:g}")
 
 
 def _mailbox(name: str) -> str:

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,13 +29,16 @@ class System:
 
 
 @asynccontextmanager
-async def running_system(config: DemoConfig) -> AsyncIterator[System]:
-    """Start everything the demo needs, in order; end it in reverse order, whatever happened."""
+async def running_system(config: DemoConfig, rapps: Sequence[Path] | None = None) -> AsyncIterator[System]:
+    """Start everything the demo needs, in order; end it in reverse order, whatever happened.
+
+    :param rapps: sources of the packages on offer; None: those that come with the repository
+    """
     logs = config.folder / "logs"
     maildir = config.folder / "mail"
     async with Children() as children:
         account = config.mail or await _mail_server(children, maildir, logs)
-        cloud = await _cloud(config, children, logs)
+        cloud = await _cloud(config, own_rapps() if rapps is None else rapps, children, logs)
         words = [str(ROBOT_SCRIPTS / "robot"), "--home", str(config.folder / "robot"), "--name", ROBOT_NAME]
         if config.robot:
             words += ["--robot", config.robot]
@@ -52,13 +55,13 @@ async def _mail_server(children: Children, maildir: Path, logs: Path) -> MailAcc
     return MailAccount("127.0.0.1", int(ready["port"]), "", "none", None, f"{ROBOT_NAME}@home.example")
 
 
-async def _cloud(config: DemoConfig, children: Children, logs: Path) -> Cloud:
+async def _cloud(config: DemoConfig, sources: Sequence[Path], children: Children, logs: Path) -> Cloud:
     if config.cloud:
         return foreign_cloud(config.cloud, os.environ)
     data = config.folder / "cloud"
     make_platform(data, ROBOT_NAME)
     write_profile(data / "profiles" / f"{ROBOT_NAME}.json", {config.recipient: config.address, **CONTACTS})
-    rapps = [word for folder in own_rapps() for word in ("--publish", str(folder))]
+    rapps = [word for folder in sources for word in ("--publish", str(folder))]
     words = [sys.executable, "-m", "rapp_cloud", "--port", "0", "--data", str(data), *rapps]
     ready = await children.start(Child("cloud", words, os.environ, logs / "cloud.log"))
     return own_cloud(data, int(ready["port"]), ROBOT_NAME)
