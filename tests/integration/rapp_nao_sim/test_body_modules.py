@@ -170,3 +170,20 @@ def test_modules_are_told_of_events_in_their_order(memory: Any, robot: Any) -> N
     for number in range(50):
         memory.raiseEvent("Counted", number)
     assert [told.get(timeout=10) for _ in range(50)] == list(range(50))
+
+
+def test_the_sonar_tells_its_keys_and_events(robot: Any, memory: Any) -> None:
+    sonar = robot.service("ALSonar")
+    keys, events = sonar.getMemoryKeyList(), sonar.getEventList()
+    assert keys == [SONAR.format(side) for side in ("Left", "Right")]
+    assert all(memory.getData(key) > 0 for key in keys)
+    assert set(events) <= set(sonar.getOutputNames())
+    assert "SonarLeftNothingDetected" in events
+
+
+def test_what_this_robot_does_not_do_can_be_switched_all_the_same(robot: Any) -> None:
+    motion = robot.service("ALMotion")
+    motion.setSmartStiffnessEnabled(False)
+    motion.setBreathEnabled("Body", False)
+    motion.setIdlePostureEnabled("Body", True)
+    robot.service("ALRobotPosture").setMaxTryNumber(2)

@@ -251,3 +251,57 @@ def test_angles_in_the_picture(cameras):
     assert cameras.getImagePositionFromAngularPosition(0, [0.1, -0.1]) == pytest.approx([0.4148, 0.3864], abs=1e-3)
     assert cameras.resolutionToSizes(VGA) == [640, 480]
     assert cameras.sizesToResolution(320, 240) == QVGA
+
+
+@pytest.fixture
+def photos(bodied, cameras):
+    photos = bodied.service("ALPhotoCapture")
+    photos.setCameraID(0)
+    photos.setResolution(QVGA)
+    photos.setPictureFormat("png")
+    photos.setColorSpace(BGR)
+    return photos
+
+
+def test_a_picture_is_taken_into_a_file_with_the_camera_s_settings(photos, cameras, folder):
+    (path,) = photos.takePicture(str(folder), "photo")
+    assert path == str(folder / "photo.png")
+    assert cv2.imread(path).shape == (240, 320, 3)
+    cameras.setParameter(0, 0, 10)
+    photos.takePicture(str(folder), "photo", True)
+    dark = cv2.imread(path).mean()
+    cameras.setParameter(0, 0, 120)
+    (path,) = photos.takePicture(str(folder), "photo")
+    assert cv2.imread(path).mean() > dark + 5
+
+
+def test_several_pictures_are_numbered(photos, folder):
+    photos.setCameraID(1)
+    photos.setResolution(QQVGA)
+    photos.setColorSpace(LUMA)
+    photos.setPictureFormat("jpg")
+    paths = photos.takePictures(2, str(folder), "row")
+    assert paths == [str(folder / name) for name in ("row_0.jpg", "row_1.jpg")]
+    assert cv2.imread(paths[1], cv2.IMREAD_UNCHANGED).shape == (120, 160)
+
+
+@pytest.mark.parametrize(
+    ("method", "args", "said"),
+    [
+        ("setCameraID", (2,), "known are 0, 1"),
+        ("setResolution", (17,), "cannot use resolution 17"),
+        ("setColorSpace", (YUV,), "known are 0, 13"),
+        ("setPictureFormat", ("doc",), "known are bmp"),
+        ("takePictures", (0, "/tmp", "none"), "1 to 1000"),
+        ("takePicture", ("/etc", "photo"), "cannot write /etc/photo"),
+    ],
+)
+def test_a_picture_that_cannot_be_taken_is_told(photos, failing, method, args, said):
+    with failing(f"ALPhotoCapture::{method}", said):
+        getattr(photos, method)(*args)
+
+
+def test_a_picture_is_not_overwritten_unless_it_may_be(photos, folder, failing):
+    photos.takePicture(str(folder), "kept")
+    with failing("ALPhotoCapture::takePicture", "it is there"):
+        photos.takePicture(str(folder), "kept", False)

@@ -126,3 +126,45 @@ def test_wrong_calls_are_answered_with_the_reason(motion: Any, method: str, args
     with pytest.raises(RuntimeError, match=f"ALMotion::{method}") as caught:
         getattr(motion, method)(*args)
     assert said in str(caught.value)
+
+
+def test_tasks_are_listed_and_ended_one_by_one(motion: Any, posture: Any) -> None:
+    assert motion.getTaskList() == []
+    head = motion.angleInterpolation(["HeadYaw", "HeadPitch"], [1.0, 0.1], 30.0, True, _async=True)
+    arm = motion.angleInterpolation("LElbowYaw", -0.5, 30.0, True, _async=True)
+    while len(motion.getTaskList()) < 2:
+        time.sleep(0.02)
+    tasks = {tuple(joints): (name, number) for name, number, _broker, _priority, joints in motion.getTaskList()}
+    assert {name for name, _number in tasks.values()} == {"angleInterpolation"}
+    assert motion.killTask(tasks["HeadYaw", "HeadPitch"][1]) is True
+    head.value(TIMEOUT)
+    assert not arm.isFinished()
+    assert motion.killTask(tasks["HeadYaw", "HeadPitch"][1]) is False
+    assert [task[4] for task in motion.getTaskList()] == [["LElbowYaw"]]
+    motion.killAll()
+    arm.value(TIMEOUT)
+
+
+def the_task(motion: Any) -> Any:
+    """The only one, as soon as there is one."""
+    until = time.monotonic() + TIMEOUT / 1000
+    while not (tasks := motion.getTaskList()):
+        assert time.monotonic() < until
+    (task,) = tasks
+    return task
+
+
+def test_a_walk_and_a_change_of_posture_are_tasks(motion: Any, posture: Any) -> None:
+    walk = motion.moveTo(40.0, 0.0, 0.0, _async=True)
+    name, number, _broker, _priority, joints = the_task(motion)
+    assert name == "move"
+    assert "LKneePitch" in joints
+    assert motion.killTask(number) is True
+    assert walk.value(TIMEOUT) is False
+    motion.waitUntilMoveIsFinished()
+    change = posture.goToPosture("Sit", 0.002, _async=True)
+    name, number, *_rest = the_task(motion)
+    assert name == "goToPosture"
+    assert motion.killTask(number) is True
+    assert change.value(TIMEOUT) is False
+    assert posture.goToPosture("Stand", 1.0)

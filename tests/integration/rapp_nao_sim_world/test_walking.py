@@ -77,6 +77,19 @@ def test_it_walks_at_a_velocity_and_stops_at_once_on_its_feet(world: WorldClient
     assert world.posture()[1] == "Standing" and not world.fallen()
 
 
+@pytest.mark.parametrize("posture", ["Stand", "StandInit"])
+def test_a_walk_that_is_stopped_at_its_very_beginning_leaves_it_on_its_feet(world: WorldClient, posture: str) -> None:
+    for after in (0.0, 0.1, 0.25, 0.5, 0.8, 1.2):  # s: while it rises, sways, and makes its first steps
+        world.set_posture(posture, 1.0)
+        world.walk_at((0.09, 0.0, 0.0), *FULL)
+        begun = world.clock()
+        until(lambda end=begun + after: world.clock() >= end)
+        world.stop_walk()
+        world.wait_for_walk(PATIENCE)
+        assert world.awake(), f"it fell when it was stopped after {after} s"
+        assert not world.fallen()
+
+
 def test_a_new_walk_replaces_the_old_one(world: WorldClient) -> None:
     results: list[bool] = []
     walking = threading.Thread(target=lambda: results.append(world.walk_to([(0.5, 0.0, 0.0)], *FULL)))

@@ -122,3 +122,13 @@ def test_a_walk_is_broken_off_within_a_fraction_of_a_second(ticks: int) -> None:
     gap = relative(stance.feet["R"], stance.feet["L"])
     assert gap[1] == pytest.approx(Style().apart, abs=0.01)
     assert math.hypot(*gap[:2]) < 0.15
+
+
+def test_stopped_while_it_rises_the_legs_stay_where_they_are() -> None:
+    start = dict(POSTURES["Stand"].angles)
+    gait = Gait(start, Stance.of(start, (0.0, 0.0, 0.0)), lambda: (0.09, 0.0, 0.0), PERIOD, Style())
+    risen = walk(gait, start, 5)[-1]
+    assert not gait.standing
+    gait.stop()
+    assert walk(gait, risen, 100)[-1] == risen
+    assert gait.standing

@@ -16,10 +16,12 @@ from rapp_nao_sim.modules.audio_recorder import ALAudioRecorder
 from rapp_nao_sim.modules.battery import ALBattery
 from rapp_nao_sim.modules.body_senses import BodySenses
 from rapp_nao_sim.modules.memory import ALMemory
+from rapp_nao_sim.modules.photo_capture import ALPhotoCapture
 from rapp_nao_sim.modules.sim_world import SimWorld
 from rapp_nao_sim.modules.sonar import ALSonar
 from rapp_nao_sim.modules.speech_recognition import ALSoundDetection, ALSpeechRecognition
 from rapp_nao_sim.modules.text_to_speech import ALTextToSpeech
+from rapp_nao_sim.modules.video_clients import all_dials
 from rapp_nao_sim.modules.video_device import ALVideoDevice
 from rapp_nao_sim.sound.room import Mixer, Room
 from rapp_nao_sim.speech.hearing import Hearing
@@ -96,7 +98,11 @@ class Host:
         if self._world is None:
             return modules
         world = self._world
-        seeing = {"ALVideoDevice": ALVideoDevice(world)}
+        dials = all_dials()
+        seeing = {
+            "ALVideoDevice": ALVideoDevice(world, dials),
+            "ALPhotoCapture": ALPhotoCapture(world, dials, Files(config.files)),
+        }
         feeling = {"ALSonar": ALSonar(world), "ALBattery": ALBattery(world)}
         return modules | motion_modules(world) | seeing | feeling
 

@@ -8,6 +8,9 @@ from rapp_nao_sim.naoqi import Module, NaoqiError, working
 from rapp_nao_sim.world.process import WorldClient
 
 PERIOD = 100  # ms between two measures
+SIDES = ("Left", "Right")
+KEYS = [f"Device/SubDeviceList/US/{side}/Sensor/Value" for side in SIDES]
+EVENTS = [f"Sonar{side}{what}" for side in SIDES for what in ("Detected", "NothingDetected")]
 
 
 @qi.multiThreaded()
@@ -43,6 +46,18 @@ class ALSonar(Module):
     def getCurrentPeriod(self) -> int:  # noqa: N802
         """ms between two measures."""
         return PERIOD
+
+    def getOutputNames(self) -> list[str]:  # noqa: N802
+        """What it tells in ALMemory: the same as getEventList and getMemoryKeyList together."""
+        return [*EVENTS, *KEYS]
+
+    def getEventList(self) -> list[str]:  # noqa: N802
+        """The events it raises."""
+        return list(EVENTS)
+
+    def getMemoryKeyList(self) -> list[str]:  # noqa: N802
+        """The keys it writes."""
+        return list(KEYS)
 
     @working
     def getFilteredValues(self) -> list[float]:  # noqa: N802

@@ -99,6 +99,11 @@ def _wrong(name: object, camera: object, resolution: object, colour: object, rat
     return ""
 
 
+def all_dials() -> "dict[int, Dials]":
+    """Of all cameras, by their numbers."""
+    return {number: Dials() for number in CAMERAS}
+
+
 class Dials:
     """What one camera is set to."""
 

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 import qi
@@ -38,10 +38,11 @@ class ALVideoDevice(Module):
     set gives false. A picture asked for sooner than the subscription's rate allows is waited for.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, dials: Mapping[int, Dials]) -> None:
+        """`dials` of each camera, which others use too."""
         self.__world = world
         self.__clients = Clients()
-        self.__dials = {number: Dials() for number in CAMERAS}
+        self.__dials = dials
         self.__active = 0
 
     def subscribeCamera(self, name: str, camera: int, resolution: int, colour: int, rate: int) -> str:  # noqa: N802

@@ -36,6 +36,7 @@ class World(Protocol):
     def stance(self, use_sensors: bool) -> Stance: ...  # noqa: D102
     def next_pose(self) -> tuple[float, float, float]: ...  # noqa: D102
     def stop_joints(self, names: Sequence[str]) -> None: ...  # noqa: D102
+    def tasks(self) -> list[tuple[str, int, list[str]]]: ...  # noqa: D102
     def busy(self, names: Sequence[str]) -> bool: ...  # noqa: D102
     def protect(self, side: str, on: bool) -> None: ...  # noqa: D102
     def guard(self, what: str, on: bool) -> None: ...  # noqa: D102

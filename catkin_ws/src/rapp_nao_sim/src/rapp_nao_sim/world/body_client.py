@@ -131,6 +131,11 @@ class BodyClient:
         """Whether a command moves any of these joints."""
         return bool(self._physics.call("busy", list(names)))
 
+    def tasks(self) -> list[tuple[str, int, list[str]]]:
+        """What is under way: what it is, its number, the joints it moves."""
+        tasks: list[tuple[str, int, list[str]]] = self._physics.call("tasks")
+        return tasks
+
     def stop_posture(self) -> None:
         """End a change of posture; who waits for it hears false."""
         self._physics.call("stop_posture")

@@ -135,8 +135,9 @@ class Gait:
     def _walk(self) -> Iterator[bool]:
         """The walk period by period; gives whether the legs are led by the places of torso and feet."""
         yield from self._rise()
-        if not self.broken:
-            yield from self._shift()
+        if self.broken:
+            return  # both soles are on the floor, and nothing swings yet: the robot stays as far as it has come
+        yield from self._shift()
         while not self.broken:
             velocity = self._wish()
             if velocity is None:

@@ -195,6 +195,13 @@ class Motion:
         walking = self.walk.active and any(name in CHAINS["Legs"] for name in names)
         return self._change is not None or walking or any(name in self._tracks for name in names)
 
+    def tasks(self) -> list[tuple[str, int, list[str]]]:
+        """What is under way: what it is, the number of the request that waits for its end, the joints it moves."""
+        found = [("angleInterpolation", number, sorted(joints, key=BODY.index)) for number, joints in self._jobs.items()]
+        if self._change is not None:
+            found.append(("goToPosture", self._change.number, list(BODY)))
+        return [*found, ("move", self.walk.number, CHAINS["Legs"])] if self.walk.active else found
+
     def velocity(self) -> tuple[float, float, float]:
         """Ahead, to the left (m/s) and turning (rad/s): of the step under way, or of the torso when it does not walk."""
         return self.walk.velocity() or self._body.velocity()

@@ -18,6 +18,7 @@ from rapp_nao_sim.world.walk_module import Walking
 
 LONGEST = 60.0  # s, of one interpolation
 HAND_TIME = 0.8  # s to open or close a hand
+PRIORITY = 90  # of every task, as told
 RAMP = 0.05  # s between two stiffnesses of an interpolation
 
 
@@ -59,6 +60,20 @@ class ALMotion(Walking, Reflexes):
     def killTasksUsingResources(self, names: str | list[str]) -> None:  # noqa: N802
         """End the movement of joints at once."""
         self.__world.stop_joints(joints(names))
+
+    @asking
+    def getTaskList(self) -> list[list[Any]]:  # noqa: N802
+        """What moves the robot now: for each task its name, number, broker, priority and joints."""
+        return [[name, number, self.getBrokerName(), PRIORITY, found] for name, number, found in self.__world.tasks()]
+
+    @asking
+    def killTask(self, number: int) -> bool:  # noqa: N802
+        """End one task of getTaskList at once; gives whether there is such a one."""
+        task = next((task for task in self.__world.tasks() if task[1] == number), None)
+        if task is not None:
+            ends = {"goToPosture": self.__world.stop_posture, "move": self.__world.stop_walk}
+            ends.get(task[0], lambda: self.__world.stop_joints(task[2]))()
+        return task is not None
 
     @asking
     def areResourcesAvailable(self, names: str | list[str]) -> bool:  # noqa: N802

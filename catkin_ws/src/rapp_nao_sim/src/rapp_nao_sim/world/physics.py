@@ -97,6 +97,7 @@ class Physics:
             "swing_arms": motion.walk.swing,
             "planned_pose": motion.walk.planned_pose,
             "busy": motion.busy,
+            "tasks": motion.tasks,
             "protect": motion.protect,
             "odometry": lambda: motion.walk.odometry.pose,
             "stance": motion.stance,

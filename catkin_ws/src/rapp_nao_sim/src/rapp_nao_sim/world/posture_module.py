@@ -39,6 +39,9 @@ class ALRobotPosture(Module):
         """End a change of posture at once."""
         self.__world.stop_posture()
 
+    def setMaxTryNumber(self, _most: int) -> None:  # noqa: N802
+        """Accepted: this robot takes a posture the first time, or not at all."""
+
     @asking
     def getPosture(self) -> str:  # noqa: N802
         """The posture the robot is in, "Unknown" in between."""

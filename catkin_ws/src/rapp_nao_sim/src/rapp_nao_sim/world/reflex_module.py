@@ -39,5 +39,14 @@ class Reflexes(Module):
             self.__world.protect(side, bool(on))
         return True
 
+    def setSmartStiffnessEnabled(self, _on: bool) -> None:  # noqa: N802
+        """Accepted: these motors do not get warm."""
+
+    def setBreathEnabled(self, _chain: str, _on: bool) -> None:  # noqa: N802
+        """Accepted: this robot does not sway when it is idle."""
+
+    def setIdlePostureEnabled(self, _chain: str, _on: bool) -> None:  # noqa: N802
+        """Accepted: this robot does not move when it is idle."""
+
     def setMotionConfig(self, _config: list[list[Any]]) -> None:  # noqa: N802
         """Accepted: what it switches (contact of the feet, the use of gyroscopes) is not part of this robot."""

@@ -60,6 +60,11 @@ class Walk:
         return self._gait is not None or self._way is not None or self._wish != _STILL
 
     @property
+    def number(self) -> int:
+        """Of the request that waits for the end of the way; 0 when it walks at a velocity."""
+        return 0 if self._way is None else self._way.number
+
+    @property
     def stopping(self) -> bool:
         """Whether it comes to stand and shall not go on."""
         return self._gait is not None and self._gait.broken and self._way is None and self._wish == _STILL
