@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from rapp_cli import bench, sim, test
 from rapp_cli.demo import command as demo
 from rapp_cli.home import down, listen, log, say, status, up
+from rapp_cli.hz import command as hz
+from rapp_cli.store import command as store
+from rapp_cli.store import keys, new, publish, trial
 from rapp_cli.trace import command as trace
 
 
@@ -21,7 +24,7 @@ class Command:
 
 
 COMMANDS = (
-    Command("demo", "run a story end to end: voice-mail or show-around", demo.add_options, demo.run),
+    Command("demo", "run a story end to end: voice-mail, show-around or hazard", demo.add_options, demo.run),
     Command("up", "start a robot and a cloud that keep running", up.add_options, up.run),
     Command("say", "speak to the simulated robot, and see what it does", say.add_options, say.run),
     Command("listen", "speak to it by this computer's microphone", listen.add_options, listen.run),
@@ -29,6 +32,12 @@ COMMANDS = (
     Command("log", "show what the agents write, and follow it", log.add_options, log.run),
     Command("trace", "draw the last run as a UML sequence diagram", trace.add_options, trace.run),
     Command("down", "end them", down.add_options, down.run),
+    Command("new", "make a RApp to begin with", new.add_options, new.run),
+    Command("run", "try a RApp on a simulated robot", trial.add_options, trial.run),
+    Command("publish", "check a RApp and put it on offer", publish.add_options, publish.run),
+    Command("store", "list and show what is on offer, or take it off", store.add_options, store.run),
+    Command("keys", "list, make, rotate and revoke a store's keys", keys.add_options, keys.run),
+    Command("hz", "build, inspect, sign and verify packages as files", hz.add_options, hz.run),
     Command("sim", "simulate a NAO in its room, or photograph the room", sim.add_options, sim.run),
     Command("test", "check and test everything, as continuous integration does", test.add_options, test.run),
     Command("bench", "measure: " + ", ".join(bench.SUBJECTS), bench.add_options, bench.run),

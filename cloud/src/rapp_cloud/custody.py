@@ -46,6 +46,10 @@ class Custody:
         gone = _revoked(lists)
         return [*found, *(Holder(name, (), None, False, tuple(gone[name]["names"])) for name in sorted(gone))]
 
+    def publishers(self) -> list[Holder]:
+        """Return the publishers whose word counts."""
+        return [holder for holder in self.holders()[len(ROLES) :] if holder.keys]
+
     def add(self, publisher: str) -> None:
         """Make a publisher's key and let them publish; one whose key was revoked gets their names back.
 

@@ -1,0 +1,1 @@
+"""`./rapp hz`: packages as files."""

@@ -1,0 +1,95 @@
+"""`./rapp run DIR`: tries a RApp on a simulated robot of its own, with a platform that offers nothing else."""
+
+import argparse
+import asyncio
+import io
+from dataclasses import replace
+from pathlib import Path
+
+from rapp_cli.demo import config as demo
+from rapp_cli.demo.story import ask
+from rapp_cli.demo.system import System, running_system
+from rapp_cli.errors import CommandError, UsageError
+from rapp_cli.person import Person
+from rapp_cli.store.place import told
+from rapp_cli.store.publish import parts
+from rapp_cli.timeline import Entry, Timeline, follow
+from rapp_hop.hz.archive import build, inspect
+from rapp_hop.hz.manifest import Manifest
+
+CORE, RAPP = "core", "dynamic"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of `./rapp run`."""
+    parser.description = "Runs a RApp once on a simulated robot that is fed with text and speaks without sound."
+    parser.add_argument("folder", type=Path, help="with package.json; of a four-agent RApp, with dynamic/ and cloud/")
+    parser.add_argument("--answer", action="append", default=[], metavar="TEXT", help="say this when the robot has spoken; repeat")
+    parser.add_argument("--say", metavar="KEYWORD", help="which of its keywords to say (the first one in English)")
+    parser.add_argument("--timeout", type=float, default=120.0, help="seconds for all of it (%(default)g)")
+
+
+@told
+def run(options: argparse.Namespace) -> int:
+    """Run it; 0 when it has ended well."""
+    folders = parts(options.folder)
+    manifest = next(found for found in map(_manifest, folders) if found.agent == "dynamic")
+    keyword = options.say or next(iter(manifest.keywords.get("en", ())), "")
+    if keyword not in manifest.keywords.get("en", ()):
+        raise UsageError(f"cannot try {manifest.name}: {keyword or 'nothing'!r} is not among its English keywords")
+    words = argparse.ArgumentParser()
+    demo.add_options(words)
+    config = replace(demo.read(words.parse_args([]), {}), command=keyword, silent=True, timeout=options.timeout)
+    return asyncio.run(_try(config, folders, options.answer))
+
+
+def _manifest(folder: Path) -> Manifest:
+    return inspect(io.BytesIO(build(folder))).manifest
+
+
+async def _try(config: demo.DemoConfig, folders: list[Path], answers: list[str]) -> int:
+    config.folder.mkdir(parents=True, exist_ok=True)
+    print(f"rapp run: everything of this run is in {config.folder}", flush=True)
+    async with running_system(config, folders) as system:
+        timeline = Timeline(record=config.folder / "timeline.jsonl")
+        following = asyncio.create_task(_show(system, timeline))
+        try:
+            async with asyncio.timeout(config.timeout):
+                return await _once(config, system, timeline, answers)
+        except TimeoutError:
+            raise CommandError(f"cannot finish within {config.timeout:.0f} s; the logs are in {system.logs}") from None
+        finally:
+            following.cancel()
+
+
+async def _once(config: demo.DemoConfig, system: System, timeline: Timeline, answers: list[str]) -> int:
+    person = Person(system.robot, config.voice)
+    await person.enter()
+    answering = asyncio.create_task(_answer(person, list(answers)))
+    try:
+        started = await ask(person, config.command, timeline)
+        await timeline.wait_for(CORE, "entered", "s3", started)
+    finally:
+        answering.cancel()
+        await person.leave()
+    return _judge(timeline.entries[started:])
+
+
+async def _answer(person: Person, answers: list[str]) -> None:
+    for text in answers:
+        await person.next_heard()
+        await person.say(text)
+
+
+def _judge(entries: list[Entry]) -> int:
+    failed = [entry for entry in entries if entry.kind == "failed"]
+    if failed:
+        print(f"rapp run: FAILED in {failed[0].state}: {failed[0].detail}", flush=True)
+        return 1
+    print("rapp run: it has ended well", flush=True)
+    return 0
+
+
+async def _show(system: System, timeline: Timeline) -> None:
+    async for entry in follow(system.bridge):
+        await timeline.add(entry)
