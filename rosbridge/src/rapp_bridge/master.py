@@ -38,6 +38,10 @@ class Master:
         """All topics that ever were, and their types; "*" when not known."""
         return [(str(topic), str(kind)) for topic, kind in self._ask("getTopicTypes")[2]]
 
+    def subscribers(self, topic: str) -> set[str]:
+        """Nodes that subscribe a topic."""
+        return {node for name, nodes in self.state()[1] if name == topic for node in nodes}
+
     def state(self) -> tuple[Entries, Entries, Entries]:
         """Publishers, subscribers and services."""
         publishers, subscribers, services = self._ask("getSystemState")[2]

@@ -24,21 +24,23 @@ from rapp_bridge.protocol import Advertise, Publish, Unadvertise
 from rapp_bridge.rostypes import has_header, message_class
 from rapp_bridge.topics import registered, topic_type
 
-OPENING = 1.0  # s after the first advertisement in which messages are kept for subscribers that are still connecting
+OPENING = 1.0  # s after the first advertisement in which messages are kept for subscribers that are still to connect
+AWAITED = 10.0  # s in which they are kept for subscribers that were there before
 OPENING_KEPT = 32  # messages, at most, that are kept meanwhile
 
 
 @dataclass(eq=False)
 class _Published:
     """A topic's publisher; new subscribers get what was kept: the last message of a latched topic, or what was published
-    just before they had connected, for a client may publish right after advertise.
+    just before they had connected, for a client may publish right after advertise, and a page that is reloaded does.
     """
 
     name: str
     cls: Any
     latch: bool
     queue_size: int
-    publisher: Any
+    awaited: set[str]  # nodes that subscribe the topic, and have not connected yet
+    publisher: Any = None
     clients: set[tuple[Client, str]] = field(default_factory=set)  # and the topic as they wrote it
     links: dict[SubscriberLink, Marker] = field(default_factory=dict)
     opened: float = field(default_factory=time.monotonic)
@@ -64,11 +66,22 @@ class _Published:
             link.send(framed)
 
     def keep(self, framed: bytes) -> None:
-        if self.latch or time.monotonic() < self.opened + OPENING:
+        if self.latch or self.is_opening:
             self.kept.append(framed)
         else:
             self.keeps = False
             self.kept.clear()
+
+    @property
+    def is_opening(self) -> bool:
+        return time.monotonic() < self.opened + (AWAITED if self.awaited else OPENING)
+
+    def welcome(self, link: SubscriberLink, caller: str) -> None:
+        """Send a new subscriber what was kept for it."""
+        if self.latch or self.is_opening:
+            for framed in self.kept:
+                link.send(framed)
+        self.awaited.discard(caller)
 
 
 class Publications:
@@ -107,7 +120,8 @@ class Publications:
         if kind is None:
             raise Invalid(f"cannot use topic {wish.topic} without a type: nobody publishes or subscribes it; give its type")
         cls, size = message_class(kind), max(1, wish.queue_size)
-        entry = self._published[name] = _Published(name, cls, wish.latch, size, None)
+        awaited = await self._blocking.run(self._master.subscribers, name)
+        entry = self._published[name] = _Published(name, cls, wish.latch, size, awaited)
         try:
             entry.publisher = await self._blocking.run(_publisher, name, cls, wish.latch)
         except Unreachable:
@@ -176,8 +190,7 @@ class Publications:
         rospys = get_topic_manager().get_publisher_impl(entry.name)
         if rospys is not None:
             rospys.add_connection(marker)
-        for framed in entry.kept:
-            link.send(framed)
+        entry.welcome(link, caller)
 
     @staticmethod
     def _lost(entry: _Published, link: SubscriberLink) -> None:
