@@ -203,10 +203,10 @@ from rosgraph.network import read_ros_handshake_header, write_ros_handshake_head
 from io import BytesIO
 _, _, uri = master.lookupService("/me", "/rapp_say")
 facts = []
-names = [("service", "/rapp_hop/secret"), ("topic", "/core_agent/state"), ("topic", "/rapp_move_to/goal"), ("other", "x")]
-for field, name in names:
+secret = {"service": "/rapp_hop/secret"}
+for names in [secret, {**secret, "topic": ""}, {"topic": "/core_agent/state"}, {"topic": "/rapp_move_to/goal"}, {"other": "x"}]:
     with socket.create_connection(("127.0.0.1", int(uri.rpartition(":")[2])), 5) as end:
-        write_ros_handshake_header(end, {field: name, "md5sum": "*", "callerid": "/core_agent", "type": "*"})
+        write_ros_handshake_header(end, {**names, "md5sum": "*", "callerid": "/core_agent", "type": "*"})
         facts.append([read_ros_handshake_header(end, BytesIO(), 4096).get("error", ""), end.recv(100).decode()])
 """
     )

@@ -167,6 +167,7 @@ time.sleep(60)
     process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
     pids = [int(word) for word in process.stdout.readline().split()]
     assert len(pids) == 3
+    os.kill(pids[2], signal.SIGSTOP)  # even a gate that stands still
     process.kill()
     process.wait()
     process.stdout.close()

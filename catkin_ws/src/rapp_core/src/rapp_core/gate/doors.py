@@ -15,8 +15,8 @@ from rapp_core.gate.relay import Doorway, Side, reach
 from rapp_core.gate.rules import Rules
 from rapp_core.gate.upstream import Upstream
 
-PASSED = ("service", "topic", "md5sum", "type", "message_definition", "persistent", "probe", "latching", "tcp_nodelay")
-"""Fields of a connection header that a RApp may fill in."""
+PASSED = ("md5sum", "type", "message_definition", "persistent", "probe", "latching", "tcp_nodelay")
+"""Fields of a connection header that a RApp may fill in; the name is the one that was judged."""
 
 
 class Doors:
@@ -71,7 +71,7 @@ class Doors:
         except Unreachable:
             self._upstream.forget(name)
             raise
-        caller.send(await _greeted(called, self._ours(asked)))
+        caller.send(await _greeted(called, {"topic" if topic else "service": name, **self._ours(asked)}))
         caller.join(called)
 
     # from the robot to what the RApp publishes
@@ -107,7 +107,7 @@ class Doors:
             raise Refused(f"cannot hear {topic[:200]}: it is not published here")
         connection, address = await self._inside.publisher(topic, port, self._upstream.node)
         called = await reach(address, connection, self._pace)
-        hearer.send(self._ours(await _greeted(called, asked)))
+        hearer.send({"topic": topic, **self._ours(await _greeted(called, asked))})
         hearer.join(called)
 
     def _ours(self, fields: Mapping[str, str]) -> dict[str, str]:
