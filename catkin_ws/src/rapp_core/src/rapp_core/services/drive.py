@@ -57,7 +57,7 @@ def drive_machine(context: Context) -> Machine:
             "look": Behaviour("look", lambda _share: None, label="posture"),
             "stand": standing_up(context),
             "drive": motion(
-                context, "drive", go, "move", watch, explain=lambda share: refuse_what_ended(context, _velocity(share))
+                context, "drive", go, "move", watch=watch, explain=lambda share: refuse_what_ended(context, _velocity(share))
             ),
         },
         "look",

@@ -11,6 +11,7 @@ from rapp_core.services.context import Context
 from rapp_core.services.reflexes import hazard
 
 _log = logging.getLogger(__name__)
+MOTION, POSTURE = "ALMotion", "ALRobotPosture"
 TELLING = 0.2  # s between two feedbacks
 FALLING = 1.0  # s that a fall takes at most
 FEELING = 0.05  # s between two looks at what a walking robot feels
@@ -46,11 +47,14 @@ def motion(
     name: str,
     begin: Begin,
     label: str,
+    module: str = MOTION,
     watch: Watch = nobody_watches,
     feedback: Feedback | None = None,
     explain: Watch = nobody_watches,
 ) -> Behaviour:
     """A state that begins a motion and ends with it. Raises Refused when the robot does not carry it out, or not in time.
+
+    `label` is the method of NAOqi's `module` that `begin` calls.
 
     While it is under way `watch` may refuse it, and `feedback` tells how far it is; `explain` may say why a robot has ended it by
     itself, such as a NAO that has protected its feet.
@@ -71,6 +75,7 @@ def motion(
                 explain(share)
                 raise Refused(f"cannot finish: the robot has ended {label} by itself; see whether it can move, and try again")
             share.memory.update(wait=None, undo=None, arrived=True)
+            context.trace.reply(module, "core", label)
             return
         if context.now() > float(str(share.memory["late"])):
             raise Refused(f"cannot finish: {label} takes more than {context.config.motion_time:g} s; ask for less at a time")
@@ -92,11 +97,11 @@ def cancel(movement: Movement) -> None:
 def standing_up(context: Context) -> Behaviour:
     """The state before a walk of a robot that does not stand."""
     speed = context.config.posture_speed
-    return motion(context, "stand", lambda _share: _posture(context, "StandInit", speed), "StandInit")
+    return motion(context, "stand", lambda _share: _posture(context, "StandInit", speed), "goToPosture", POSTURE)
 
 
 def _posture(context: Context, name: str, speed: float) -> Movement:
-    context.trace.call("core", "ALRobotPosture", "goToPosture")
+    context.trace.call("core", POSTURE, "goToPosture")
     return context.robot.motion.take_posture(name, speed)
 
 

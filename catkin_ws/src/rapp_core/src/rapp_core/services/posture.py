@@ -8,7 +8,7 @@ from rapp_core.body_ports import Movement
 from rapp_core.errors import Invalid
 from rapp_core.services.context import Context, request
 from rapp_core.services.joints import share_of_speed
-from rapp_core.services.moving import motion
+from rapp_core.services.moving import POSTURE, motion
 
 RESTING = ("Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
 
@@ -24,7 +24,7 @@ def machine(context: Context) -> Machine:
         share.memory["speed"] = share_of_speed(float(request(share, "speed")), context.config.posture_speed)
 
     def take(share: Subsystem) -> Movement:
-        context.trace.call("core", "ALRobotPosture", "goToPosture")
+        context.trace.call("core", POSTURE, "goToPosture")
         return robot.take_posture(request(share, "posture"), float(str(share.memory["speed"])))
 
     def now(_share: Subsystem) -> Mapping[str, Any]:
@@ -34,7 +34,7 @@ def machine(context: Context) -> Machine:
         "rapp_take_predefined_posture",
         {
             "check": Behaviour("check", check, label="check"),
-            "take": motion(context, "take", take, "goToPosture", feedback=now),
+            "take": motion(context, "take", take, "goToPosture", POSTURE, feedback=now),
         },
         "check",
         [Edge("check", "take")],
@@ -59,7 +59,7 @@ def rest_machine(context: Context) -> Machine:
             raise Invalid(f"cannot rest in posture {request(share, 'posture')!r}: known are {', '.join(RESTING)}")
 
     def take(share: Subsystem) -> Movement:
-        context.trace.call("core", "ALRobotPosture", "goToPosture")
+        context.trace.call("core", POSTURE, "goToPosture")
         return context.robot.motion.take_posture(request(share, "posture") or RESTING[0], context.config.posture_speed)
 
     def relax(_share: Subsystem) -> Movement:
@@ -70,7 +70,7 @@ def rest_machine(context: Context) -> Machine:
         "rapp_rest",
         {
             "check": Behaviour("check", check, label="check"),
-            "take": motion(context, "take", take, "goToPosture"),
+            "take": motion(context, "take", take, "goToPosture", POSTURE),
             "relax": motion(context, "relax", relax, "stiffnessInterpolation"),
         },
         "check",

@@ -96,7 +96,6 @@ class _Walk:
 
     def arrive(self, _share: Subsystem) -> None:
         """Judge where the robot has come to. Raises Refused."""
-        self._context.trace.reply("ALMotion", "core", "moveTo")
         config = self._context.config
         self._pose = self._motion.pose()
         left = self.left()
@@ -137,7 +136,7 @@ def machine(context: Context) -> Machine:
         {
             "check": Behaviour("check", check, label="check"),
             "stand": standing_up(context),
-            "walk": motion(context, "walk", do.walk, "moveTo", do.watch, do.from_start, do.explain),
+            "walk": motion(context, "walk", do.walk, "moveTo", watch=do.watch, feedback=do.from_start, explain=do.explain),
             "arrived": Behaviour("arrived", do.arrive, label="judge"),
         },
         "check",
@@ -167,8 +166,8 @@ def path_machine(context: Context) -> Machine:
             "check": Behaviour("check", check, label="check"),
             "stand": standing_up(context),
             "next": Behaviour("next", do.next, label="next pose"),
-            "turn": motion(context, "turn", do.turn, "moveTo", do.watch, do.on_path, do.explain),
-            "walk": motion(context, "walk", do.walk, "moveTo", do.watch, do.on_path, do.explain),
+            "turn": motion(context, "turn", do.turn, "moveTo", watch=do.watch, feedback=do.on_path, explain=do.explain),
+            "walk": motion(context, "walk", do.walk, "moveTo", watch=do.watch, feedback=do.on_path, explain=do.explain),
             "judge": Behaviour("judge", do.arrive, label="judge"),
             "arrived": Behaviour("arrived", lambda _share: None, label="arrived"),
         },
