@@ -11,7 +11,7 @@ SUBJECTS = {
     "activation": "activation.py",
     "speech": "speech.py",
     "interpret": "interpret.py",
-    "bridge": "bridge.py",
+    "rosbridge": "rosbridge.py",
     "hop": "hop.py",
     "robot": "robot.py",
 }
