@@ -1,14 +1,18 @@
 """Topics both ways, and clients that are slow, leave, or send what is off."""
 
 import asyncio
+import io
 import json
+import struct
 import xmlrpc.client
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import cbor2
 import pytest
+from sensor_msgs.msg import LaserScan
 from tornado.websocket import WebSocketClosedError
 
 from fakes.bridge_neighbours import PATIENCE, Clients, Peer, Socket
@@ -163,5 +167,45 @@ def test_a_client_that_never_reads_slows_no_other_and_costs_bounded_memory(clien
             grown = memory(bridge.process.pid) - before
             sleeper.close()
             assert grown < 40_000_000, "200 MB were sent; 4 MB may wait for the sleeper"
+
+    asyncio.run(story())
+
+
+def test_a_client_may_publish_in_cbor_with_typed_arrays_and_raw(clients: Clients) -> None:
+    async def story() -> None:
+        async with clients:
+            listener, speaker = await clients.new(), await clients.new()
+            await listener.send(op="subscribe", topic="/in_cbor", type="sensor_msgs/LaserScan")
+            await listener.settle()
+            await speaker.raw(cbor2.dumps({"op": "advertise", "topic": "/in_cbor", "type": "sensor_msgs/LaserScan"}))
+            ranges = cbor2.CBORTag(85, struct.pack("<3f", 0.5, 1.5, float("inf")))
+            msg = {"header": {"frame_id": "f"}, "ranges": ranges, "intensities": [1, 2.5]}
+            await speaker.raw(cbor2.dumps({"op": "publish", "topic": "/in_cbor", "msg": msg}))
+            heard = (await listener.receive("publish"))["msg"]
+            assert (heard["ranges"], heard["intensities"]) == ([0.5, 1.5, None], [1.0, 2.5])
+            serialized = io.BytesIO()
+            LaserScan(ranges=[7.0]).serialize(serialized)
+            raw = {"op": "publish", "topic": "/in_cbor", "compression": "cbor-raw", "msg": {"bytes": serialized.getvalue()}}
+            await speaker.raw(cbor2.dumps(raw))
+            assert (await listener.receive("publish"))["msg"]["ranges"] == [7.0]
+
+    asyncio.run(story())
+
+
+def test_throttled_subscribers_get_the_first_and_with_a_queue_the_newest_in_order(clients: Clients) -> None:
+    async def story() -> None:
+        async with clients:
+            queued, plain, speaker = await clients.new(), await clients.new(), await clients.new()
+            for socket, length in ((queued, 2), (plain, 0)):
+                wish = {"throttle_rate": 1000, "queue_length": length, "type": "std_msgs/String"}
+                await socket.send(op="subscribe", topic="/throttled", **wish)
+                await socket.settle()
+            await speaker.send(op="advertise", topic="/throttled", type="std_msgs/String")
+            for number in range(10):
+                await speaker.send(op="publish", topic="/throttled", msg={"data": str(number)})
+            assert [(await queued.receive("publish"))["msg"]["data"] for _ in range(3)] == ["0", "8", "9"]
+            assert (await plain.receive("publish"))["msg"]["data"] == "0"
+            await speaker.send(op="publish", topic="/throttled", msg={"data": "later"})
+            assert (await plain.receive("publish"))["msg"]["data"] == "later"
 
     asyncio.run(story())
