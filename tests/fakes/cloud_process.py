@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -75,14 +76,20 @@ class CloudProcess:
         token = (self.data / "robots" / f"{robot}.token").read_text()
         return HopClient(f"http://127.0.0.1:{self.port}", token)
 
-    def agents(self) -> list[int]:
-        """Process ids of bubblewraps around cloud agents, not that around the spare."""
-        used = [path.parent for path in (self.data / "agents" / "runs").glob("*/package") if any(path.iterdir())]
-        return [int((path / "pid").read_text().split()[0]) for path in used]
+    def agents(self) -> list[str]:
+        """Folders of cloud agents, not that of the spare."""
+        return sorted({str(path.parent.parent) for path in (self.data / "agents" / "runs").glob("*/package/*")})
 
     def left(self) -> list[str]:
         """Command lines of all processes of agents and of the spare."""
         return processes_of(self.data / "agents" / "runs")
+
+    def until_nothing_is_left(self) -> None:
+        """Wait until no process and no folder of any agent is left."""
+        deadline = time.monotonic() + PATIENCE
+        while left := [*self.left(), *(self.data / "agents" / "runs").iterdir()]:
+            assert time.monotonic() < deadline, left
+            time.sleep(0.05)
 
 
 @contextmanager

@@ -312,15 +312,20 @@ def listening_after(moment: Seen) -> Callable[[Seen], bool]:
     return lambda seen: entered("s3")(seen) and seen.time > moment.time
 
 
-def processes_of(folder: Path | str, but: Sequence[int] = ()) -> list[str]:
-    """Command lines of the running processes that name the folder, or whatever is given."""
-    found = []
+def running_of(folder: Path, but: Sequence[int] = ()) -> dict[int, str]:
+    """Process ids and command lines of the running processes that name the folder."""
+    found = {}
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         with suppress(OSError):  # it may end meanwhile
             words = path.read_bytes().replace(b"\0", b" ").decode(errors="replace")
             if str(folder) in words and int(path.parent.name) not in (os.getpid(), *but):
-                found.append(words)
+                found[int(path.parent.name)] = words
     return found
+
+
+def processes_of(folder: Path, but: Sequence[int] = ()) -> list[str]:
+    """Command lines of the running processes that name the folder."""
+    return list(running_of(folder, but).values())
 
 
 @contextmanager

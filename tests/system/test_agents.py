@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from fakes.rapps import write_four_agent_rapp, write_rapp
-from fakes.whole_robot import WholeRobot, entered, whole_robot
+from fakes.whole_robot import WholeRobot, entered, running_of, whole_robot
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -151,8 +151,8 @@ def test_the_cloud_agent_s_process_is_gone_before_the_dynamic_agent_s(robot: Who
 
 def cloud_agent(robot: WholeRobot) -> int:
     """Process id of bubblewrap around the cloud agent: the spare has no package yet."""
-    (pid,) = [path.parent for path in (robot.data / "agents" / "runs").glob("*/package") if any(path.iterdir())]
-    return int((pid / "pid").read_text().split()[0])
+    (folder,) = [path.parent for path in (robot.data / "agents" / "runs").glob("*/package") if any(path.iterdir())]
+    return min(pid for pid, words in running_of(folder).items() if words.startswith("bwrap"))
 
 
 def dynamic_agent(robot: WholeRobot) -> int:

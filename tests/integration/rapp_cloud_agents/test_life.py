@@ -5,12 +5,12 @@ import os
 import signal
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from fakes.cloud_agents import PROBE, Workshop, call, in_workshop, until
 from fakes.whole_robot import processes_of
+from rapp_cloud.cloud_agents.orphans import clear
 from rapp_cloud.cloud_agents.sandbox import Limits
 from rapp_hop.errors import Bug, HopError, Refused, Unreachable
 
@@ -183,23 +183,21 @@ def test_a_folder_that_another_platform_uses_is_refused(tmp_path: Path) -> None:
     in_workshop(tmp_path, test)
 
 
-def test_l12_only_what_the_earlier_platform_started_is_killed(tmp_path: Path) -> None:
-    """A process id in an old folder may be somebody else's by now."""
+def test_l12_only_what_an_earlier_platform_started_is_killed(tmp_path: Path) -> None:
+    """Neither by a process id, which may be somebody else's by now, nor by the name of a program."""
 
     async def test(shop: Workshop) -> None:
-        await shop.engine.close()
-        sleeper = await asyncio.create_subprocess_exec("sleep", "1000", start_new_session=True)
-        folder = tmp_path / "agents" / "runs" / "old"
-        folder.mkdir()
-        (folder / "pid").write_text(f"{sleeper.pid} 1")
-        await shop.engine.open()
-        assert sleeper.returncode is None and not folder.exists()
-        folder.mkdir()
-        stat: Any = Path(f"/proc/{sleeper.pid}/stat").read_text().rpartition(")")[2].split()[19]
-        (folder / "pid").write_text(f"{sleeper.pid} {stat}")
-        await shop.engine.close()
-        await shop.engine.open()
-        assert await asyncio.wait_for(sleeper.wait(), 20) == -signal.SIGKILL
+        agent = await shop.start()
+        runs = tmp_path / "agents" / "runs"
+        words = ["bash", "-c", "exec -a bwrap sleep 1000", f"{tmp_path}/elsewhere/package", f"--title={runs}/x"]
+        other = await asyncio.create_subprocess_exec(*words)
+        await asyncio.to_thread(clear, runs, "other-name")
+        assert agent.problem == "" and list(runs.iterdir())
+        await asyncio.to_thread(clear, runs)
+        await until(lambda: not agent.process.alive)
+        assert other.returncode is None
+        other.kill()
+        await other.wait()
 
     in_workshop(tmp_path, test)
 

@@ -238,11 +238,9 @@ def test_c06_c08_a_platform_that_dies_leaves_nothing_and_serves_anew(tmp_path: P
 
         cloud.run(fill)
         assert len(cloud.agents()) == 6
-        old = {path.name for path in (cloud.data / "agents" / "runs").iterdir()}
         cloud.stop(number)
-        asyncio.run(until(lambda: cloud.left() == []))
+        cloud.until_nothing_is_left()
         cloud.start()
-        assert not old & {path.name for path in (cloud.data / "agents" / "runs").iterdir()}
         cloud.run(again)
 
 

@@ -8,7 +8,7 @@ import secrets
 import shutil
 from pathlib import Path
 
-from rapp_cloud.cloud_agents import orphans
+from rapp_cloud.cloud_agents.orphans import RUNS, Keeper, clear
 from rapp_cloud.cloud_agents.port import Order
 from rapp_cloud.cloud_agents.process import LocalAgent, Serve
 from rapp_cloud.cloud_agents.sandbox import Folders, Limits
@@ -35,10 +35,12 @@ class LocalProcesses:
         self._agents: set[LocalAgent] = set()  # the spare too
         self._spare: asyncio.Task[LocalAgent] | None = None
         self._lock: int | None = None
+        self._name = secrets.token_hex(4)  # of this platform's life
+        self._keeper: Keeper | None = None
 
     async def open(self) -> None:
         """See `port.CloudAgentEngine`."""
-        runs = self._folder / "runs"
+        runs = self._folder / RUNS
         runs.mkdir(parents=True, exist_ok=True, mode=0o700)
         self._lock = os.open(self._folder / ".lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
         try:
@@ -47,7 +49,7 @@ class LocalProcesses:
             os.close(self._lock)
             self._lock = None
             raise Refused(f"cannot use {self._folder}: another platform runs there, give this one its own --data") from None
-        await asyncio.to_thread(orphans.clear, runs)
+        await asyncio.to_thread(clear, runs)
 
     async def prepare(self) -> None:
         """See `port.CloudAgentEngine`."""
@@ -82,6 +84,9 @@ class LocalProcesses:
             self._spare.cancel()
             await asyncio.gather(self._spare, return_exceptions=True)
         await asyncio.gather(*(agent.stop() for agent in list(self._agents)))
+        if self._keeper is not None:
+            await asyncio.to_thread(self._keeper.close)
+            self._keeper = None
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -106,7 +111,9 @@ class LocalProcesses:
             raise
 
     async def _warm(self) -> LocalAgent:
-        folders = Folders(self._folder / "runs" / secrets.token_hex(6), self._account())
+        if self._keeper is None:
+            self._keeper = Keeper(self._folder, self._name)
+        folders = Folders(self._folder / RUNS / f"{self._name}-{secrets.token_hex(6)}", self._account())
         agent = await LocalAgent.start(folders, self._limits)
         self._agents.add(agent)
         try:

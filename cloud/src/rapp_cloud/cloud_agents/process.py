@@ -11,7 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from rapp_cloud.cloud_agents import orphans
 from rapp_cloud.cloud_agents.channel import Channel
 from rapp_cloud.cloud_agents.confined import NEEDS, Confined
 from rapp_cloud.cloud_agents.port import Order
@@ -85,7 +84,6 @@ class LocalAgent:
             os.close(place)
             shutil.rmtree(folders.root, ignore_errors=True)
             raise
-        orphans.note(folders.root, process.pid)
         return cls(folders, limits, process, await Channel.of(ours), place)
 
     @property
