@@ -122,7 +122,7 @@ class _Reader:
 
     def _definition(self) -> Any:
         index = self._item()
-        if not isinstance(index, int):
+        if type(index) is not int:
             raise Invalid("cannot read Bigloo's serialisation: a definition without number")
         self._known[index] = None  # a value that holds itself has no end in JSON
         self._known[index] = self._item()

@@ -106,10 +106,10 @@ class ServiceJob:
             result = File(result)
         if isinstance(result, File):
             self._remove = result.path if result.remove else None
-            return WireAnswer(200, result.content_type, result.path, _offer(result.name or result.path.name))
+            return WireAnswer(200, _one_line(result.content_type), result.path, _offer(result.name or result.path.name))
         if isinstance(result, Stream | AsyncIterable):
             stream = result if isinstance(result, Stream) else Stream(result, ANY_TYPE)
-            return WireAnswer(200, stream.content_type, _pieces(stream), _offer(stream.name))
+            return WireAnswer(200, _one_line(stream.content_type), _pieces(stream), _offer(stream.name))
         return self._form.write(result, self._service)
 
 
@@ -154,6 +154,12 @@ def note(brake: Brake, head: Head, error: HopError) -> None:
 def _make_folder(parent: Path) -> tempfile.TemporaryDirectory[str]:
     parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     return tempfile.TemporaryDirectory(dir=parent)
+
+
+def _one_line(content_type: str) -> str:
+    if not content_type.isprintable() or not content_type.isascii():
+        raise Bug("cannot answer: the service gives a content type that is none")
+    return content_type
 
 
 def _offer(name: str) -> tuple[tuple[str, str], ...]:

@@ -5,6 +5,7 @@ moment for the body, so that a request behind it on the same connection is serve
 """
 
 import asyncio
+import logging
 from typing import Protocol
 
 from tornado.httputil import HTTPConnection, HTTPHeaders, HTTPMessageDelegate, RequestStartLine, ResponseStartLine
@@ -17,6 +18,7 @@ from rapp_hop.sending import send
 from rapp_hop.spool import Spool
 from rapp_hop.streams import PatientStream, PatientTlsStream
 
+_log = logging.getLogger(__name__)
 GRACE = 0.25  # seconds for a body that is not wanted
 
 
@@ -30,8 +32,8 @@ class Site(Protocol):
     def begin(self, head: Head) -> Job | WireAnswer:
         """Return who answers a request, or the answer."""
 
-    def ended(self, message: "Message") -> None:
-        """Forget a request."""
+    def running(self, message: "Message", is_so: bool) -> None:
+        """Know which requests are being answered."""
 
     def spool(self) -> Spool:
         """Return a place for a body."""
@@ -58,17 +60,14 @@ class Message(HTTPMessageDelegate):
         self._version = "1.1"
         self._task: asyncio.Task[None] | None = None
         self._whole = False
-        stream.expecting, stream.began = True, None
-
-    @property
-    def busy(self) -> bool:
-        """Whether it is being answered."""
-        return self._task is not None
+        stream.expect(self._loop.time())
 
     def headers_received(self, start_line: RequestStartLine | ResponseStartLine, headers: HTTPHeaders) -> None:
         """Know who answers, and whether the body may come."""
         assert isinstance(start_line, RequestStartLine)
         self.stream.expecting = False
+        if self.stream.closed():  # what follows a request that ended the connection, still in Tornado's hands
+            return
         self._version = start_line.version.removeprefix("HTTP/")
         try:
             head = make_head(start_line.method, self._version, start_line.path, headers, self._address, self._site.header_bytes)
@@ -104,6 +103,7 @@ class Message(HTTPMessageDelegate):
         self.deadline = None
         if self._task is None:
             self._task = self._loop.create_task(self._serve())
+            self._site.running(self, True)
 
     def on_connection_close(self) -> None:
         """The peer has gone, or broken the rules, before the request was whole."""
@@ -140,6 +140,7 @@ class Message(HTTPMessageDelegate):
         self.deadline = None
         if self._task is None:
             self._task = self._loop.create_task(self._serve())
+            self._site.running(self, True)
 
     async def _serve(self) -> None:
         try:
@@ -150,14 +151,18 @@ class Message(HTTPMessageDelegate):
                 without_body = self._head is not None and self._head.method == "HEAD"
                 await send(self.stream, answer, self._keep, without_body, self._version, self._site.send_timeout)
                 self._line.finish()
+                if not self._keep:
+                    self.stream.close()
+        except Exception:  # noqa: BLE001 (nobody waits for this task)
+            _log.exception("an answer could not be sent")
+            self.stream.close()
         finally:
             self._end()
             if self._job is not None:
                 await self._job.done()
-            self._task = None
+            self._site.running(self, False)
 
     def _end(self) -> None:
         if self._body is not None:
             self._body.drop()
         self.deadline = None
-        self._site.ended(self)

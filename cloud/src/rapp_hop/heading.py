@@ -38,6 +38,9 @@ def make_head(method: str, version: str, target: str, fields: HTTPHeaders, addre
         raise long_head(limit)
     if version == "1.1" and "host" not in headers:
         raise Invalid("cannot read the request: it has no header Host")
+    length = headers.get("content-length", "0")
+    if not (length.isascii() and length.isdecimal()):
+        raise Invalid("cannot read the request: its Content-Length is no number")
     path, _, query = target.partition("?")
     if not path.startswith("/") or not target.isascii():
         raise Invalid("cannot read the request: its target is no path")

@@ -105,7 +105,8 @@ class HopServer:
         # Tornado's own limit on bodies would answer with a bare 400; each job has its own.
         self._http = HTTPServer(_Requests(self), max_header_size=self.limits.headers, max_body_size=sys.maxsize,
                                 idle_connection_timeout=self.limits.idle_timeout)  # fmt: skip
-        self._messages: set[Message] = set()
+        self._messages: dict[PatientStream | PatientTlsStream, Message] = {}  # the one each connection has
+        self._running: set[Message] = set()
         self._streams: dict[PatientStream | PatientTlsStream, str] = {}
         self._of_address: Counter[str] = Counter()
         self._stop_listening: list[Callable[[], None]] = []
@@ -152,10 +153,10 @@ class HopServer:
         for listening in self._sockets:
             listening.close()
         end = self._loop.time() + self.limits.drain
-        while any(message.busy for message in self._messages) and self._loop.time() < end:
+        while self._running and self._loop.time() < end:
             await asyncio.sleep(0.02)
         self._sweeping.cancel()
-        for message in list(self._messages):
+        for message in list(self._running):
             message.cancel()
         await self._http.close_all_connections()
         await asyncio.gather(self._sweeping, *([self._warming] if self._warming else []), return_exceptions=True)
@@ -166,12 +167,12 @@ class HopServer:
         """Expect the next request of a connection."""
         stream = line.stream  # type: ignore[attr-defined]
         message = Message(self, line, stream, self._streams.get(stream, ""))
-        self._messages.add(message)
+        self._messages[stream] = message
         return message
 
-    def ended(self, message: Message) -> None:
-        """Forget a request."""
-        self._messages.discard(message)
+    def running(self, message: Message, is_so: bool) -> None:
+        """Know which requests are being answered."""
+        (self._running.add if is_so else self._running.discard)(message)
 
     def _accept(self, tls: ssl.SSLContext | None, connection: socket.socket, peer: Any) -> None:
         address = peer[0] if isinstance(peer, tuple) else ""
@@ -204,6 +205,7 @@ class HopServer:
         return head_of(answer, False, len(answer.body)) + answer.body
 
     def _forget(self, stream: PatientStream | PatientTlsStream) -> None:
+        self._messages.pop(stream, None)
         address = self._streams.pop(stream, "")
         self._of_address[address] -= 1
         if self._of_address[address] <= 0:
@@ -265,7 +267,7 @@ class HopServer:
         while True:
             await asyncio.sleep(period)
             now = self._loop.time()
-            for message in list(self._messages):
+            for message in list(self._messages.values()):
                 if message.deadline is not None and now > message.deadline:
                     message.overdue()
                 elif message.stream.expecting and now - (message.stream.began or now) > self.header_timeout:

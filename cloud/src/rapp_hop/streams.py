@@ -27,6 +27,7 @@ class _Patient:
     began: float | None = None  # when the first byte of a request came that is expected
     expecting = False  # a request
     _state: int | None  # Tornado's: what it listens for
+    _read_buffer_size: int  # Tornado's
     on_closed: Callable[[], None] | None = None
 
     def read_from_fd(self, buf: bytearray | memoryview) -> int | None:
@@ -39,6 +40,10 @@ class _Patient:
         if count and self.expecting and self.began is None:
             self.began = asyncio.get_running_loop().time()
         return count
+
+    def expect(self, now: float) -> None:
+        """Expect a request; some of it may have come already, behind the one before."""
+        self.expecting, self.began = True, now if self._read_buffer_size else None
 
     def write(self, data: bytes | memoryview) -> "asyncio.Future[None]":
         """Write, the whole answer where Tornado has only its first line."""
