@@ -28,6 +28,7 @@ from rapp_cloud.services.sight import sight_services
 from rapp_cloud.services.voice import voice_services
 from rapp_cloud.shelf import Shelf
 from rapp_cloud.static import store_files
+from rapp_cloud.store_page import store_page
 from rapp_cloud.tls import server_tls
 from rapp_cloud.weblets import weblets
 from rapp_hop.errors import HopError
@@ -67,6 +68,7 @@ async def running_cloud(config: CloudConfig) -> AsyncIterator[int]:
         store_files("/tuf/metadata/", shelf.metadata),
         store_files("/tuf/targets/", shelf.targets),
         weblets(shelf, "https" if tls else "http"),
+        store_page(shelf),
         agent_calls(agents),
     ], tls=tls)  # fmt: skip
     refreshing = asyncio.create_task(_keep_fresh(shelf, config.refresh))

@@ -13,7 +13,9 @@ from typing import Any
 import pytest
 
 from fakes.packages import file_member, folder_member, manifest, packed, right_members, tar_bytes
-from rapp_hop.errors import Invalid
+from rapp_cloud.catalogue import RobotKind, catalogue
+from rapp_cloud.publishing import check_publication
+from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.archive import extract, inspect
 from rapp_hop.hz.install import PackageFile, RappFolder, install
 from rapp_hop.hz.manifest import parse_manifest, reasons_against
@@ -265,6 +267,16 @@ def test_p27_entry_not_in_the_package(robot: Robot) -> None:
 def test_p28_unknown_permissions_and_all_of_them(robot: Robot, core: list[str]) -> None:
     robot.refuses(changed(permissions={"core": core}), "cannot grant")
     robot.refuses(changed(permissions={"cloud": ["*"]}), "no wildcards")
+
+
+def test_p29_dynamic_and_cloud_agent_of_other_versions() -> None:
+    dynamic = parse_manifest(json.dumps(manifest(version="2.0.0", partner="hello_cloud")).encode())
+    words: dict[str, Any] = {"agent": "cloud", "keywords": {}, "sentences": {}, "permissions": {"core": [], "cloud": []}}
+    cloud = parse_manifest(json.dumps(manifest("hello_cloud", "1.0.0", **words)).encode())
+    (entry,) = catalogue([dynamic, cloud], RobotKind("nao", "1.0"))
+    assert entry.reasons == ("its cloud agent hello_cloud 2.0.0 is not in the store",)
+    with pytest.raises(Refused, match=r"publish its cloud agent hello_cloud 2\.0\.0 first"):
+        check_publication(dynamic, [cloud])
 
 
 def test_p30_robots_it_is_not_for() -> None:

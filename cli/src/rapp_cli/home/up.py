@@ -21,6 +21,7 @@ from rapp_cli.home.ports import USUAL, choose, is_served
 from rapp_cli.home.supervisor import Process, Supervisor
 from rapp_cli.timeline import follow
 from rapp_cloud.app import open_shelf
+from rapp_cloud.keys import passphrase_from
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
 
@@ -103,7 +104,7 @@ def _prepare(home: Home, settings: Settings) -> None:
 
 def _offer(home: Home, folder: Path) -> None:
     try:
-        open_shelf(home.cloud).publish(build(folder))
+        open_shelf(home.cloud, passphrase_from(os.environ)).publish(build(folder))
     except (HopError, OSError) as error:
         print(f"rapp up: the store keeps what it has of {folder.name}: {error}", flush=True)
 
