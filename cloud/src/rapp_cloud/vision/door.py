@@ -17,7 +17,8 @@ FIELD_OF_VIEW = math.radians(60.97)  # of a NAO's cameras, from left to right
 SHAPES = (0.3, 0.75)  # width of a door's leaf, in heights
 HALF_SHAPES = (0.6, 2.2)  # its width in heights of the camera, when its top is not in the picture
 EYE = (0.12, 0.75)  # height of the camera above the floor, in heights of the leaf: it looks from below the top
-SURE = 0.5  # confidence from which the answer counts
+SMALLEST = 0.4  # of the picture's height, that a leaf is high at least
+SURE = 0.55  # confidence from which the answer counts
 CLOSED = math.radians(5.0)  # up to which a door counts as closed
 MOST = 60  # rectangles that are looked at
 BESIDE_FOOT = 0.015  # of its distance below the horizon that a hinge stands beside the wall's foot
@@ -45,7 +46,7 @@ def look_at_door(image: Image, field_of_view: float = FIELD_OF_VIEW) -> Door:
     if picture is None:
         return Door(None, 0.0)
     edges = Edges(picture)
-    found = [leaf for leaf in outlines(picture, edges) if _like_a_door(leaf)][:MOST]
+    found = [leaf for leaf in outlines(picture, edges) if _like_a_door(leaf, picture)][:MOST]
     walls = [(leaf, wall) for leaf in found if (wall := wall_round(picture, edges, leaf))]
     hung = [(leaf, wall, _rank(leaf) * _hinged(leaf, wall, picture) * _solid(leaf, wall, edges)) for leaf, wall in walls]
     if not hung:
@@ -59,10 +60,11 @@ def look_at_door(image: Image, field_of_view: float = FIELD_OF_VIEW) -> Door:
     return Door(angle, float(rank / _rank(leaf) * leaf.support * wall.agreed * min(1.0, 0.4 + 4 * margin)))
 
 
-def _like_a_door(leaf: Outline) -> bool:
-    if leaf.height is None or leaf.top is None:
+def _like_a_door(leaf: Outline, picture: Level) -> bool:
+    if leaf.height is None:
         return HALF_SHAPES[0] <= leaf.width / leaf.bottom <= HALF_SHAPES[1]
-    return SHAPES[0] <= leaf.width / leaf.height <= SHAPES[1] and EYE[0] <= leaf.bottom / leaf.height <= EYE[1]
+    shaped = SHAPES[0] <= leaf.width / leaf.height <= SHAPES[1] and EYE[0] <= leaf.bottom / leaf.height <= EYE[1]
+    return shaped and leaf.height * (1 + leaf.t * (leaf.x1 + leaf.x2) / 2) * picture.focal >= SMALLEST * picture.height
 
 
 def _rank(leaf: Outline) -> float:

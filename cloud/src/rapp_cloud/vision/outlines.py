@@ -64,7 +64,7 @@ class Edges:
         edge &= self._seen
         self.size = edge.shape
         clear = float(np.percentile(strength[edge], CLEAR)) if edge.any() else 1.0
-        weight = np.clip(strength / clear, 0, 1) * edge * FULL
+        weight = np.sqrt(np.clip(strength / clear, 0, 1)) * edge * FULL
         near = np.ones((2 * NEAR + 1, 2 * NEAR + 1), np.uint8)
         number = np.floor(tangent / math.pi * BINS).astype(int) % BINS
         plain = [np.where(number == each, weight, 0).astype(np.uint8) for each in range(BINS)]
