@@ -77,6 +77,8 @@ class ServiceJob:
             answer = self._written(await self._run(call))
             if isinstance(answer.body, bytes):
                 await self.done()  # so that who has the answer knows the files gone
+            elif isinstance(answer.body, Path) and not await asyncio.to_thread(answer.body.is_file):
+                raise Bug(f"cannot answer for {self._service.name}: the file it made is not there")
             return answer
         except HopError as error:
             return self.failed(error)

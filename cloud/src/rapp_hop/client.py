@@ -272,7 +272,7 @@ def _result(url: str, response: HTTPResponse, *, texts: bool) -> Any:
     kind = response.headers.get("Content-Type", "").partition(";")[0].strip().lower()
     if texts and kind.startswith("text/"):
         return response.body.decode("utf-8", "replace")
-    if kind not in ("", "application/json") and not kind.startswith("text/"):
+    if kind not in ("", "application/json"):
         raise Invalid(f"cannot take the answer of {url.partition('?')[0]} as a value: it is a file, use fetch")
     return strict_json.loads(response.body, limit=MAX_ANSWER)
 

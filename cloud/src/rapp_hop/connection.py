@@ -62,19 +62,21 @@ class Message(HTTPMessageDelegate):
         self._whole = False
         stream.expect(self._loop.time())
 
-    def headers_received(self, start_line: RequestStartLine | ResponseStartLine, headers: HTTPHeaders) -> None:
-        """Know who answers, and whether the body may come."""
+    def headers_received(
+        self, start_line: RequestStartLine | ResponseStartLine, headers: HTTPHeaders
+    ) -> "asyncio.Task[None] | None":
+        """Know who answers, and whether the body may come; who asks first is told before he sends it."""
         assert isinstance(start_line, RequestStartLine)
         self.stream.expecting = False
         if self.stream.closed():  # what follows a request that ended the connection, still in Tornado's hands
-            return
+            return None
         self._version = start_line.version.removeprefix("HTTP/")
         try:
             head = make_head(start_line.method, self._version, start_line.path, headers, self._address, self._site.header_bytes)
         except HopError as error:
             self._answer = self._site.malformed(error)
             self._answer_now()
-            return
+            return self._task
         self._head = head
         connection = head.headers.get("connection", "").lower()
         self._keep = connection != "close" if self._version == "1.1" else connection == "keep-alive"
@@ -84,6 +86,7 @@ class Message(HTTPMessageDelegate):
         else:
             self._job = found
         self._expect_body(head)
+        return self._task
 
     def data_received(self, chunk: bytes) -> "asyncio.Future[None] | None":
         """Keep a piece of the body; nothing more is read while it goes to the disk."""
@@ -127,6 +130,9 @@ class Message(HTTPMessageDelegate):
             return
         if self._job is not None and length.isdecimal() and int(length) > self._job.max_body:
             self._too_large(self._job)
+            return
+        if self._answer is not None and "expect" in head.headers:
+            self._answer_now()
             return
         self.deadline = self._loop.time() + (GRACE if self._answer is not None else self._site.body_timeout)
 

@@ -33,7 +33,7 @@ class Sink:
         name, _, value = line.partition(":")
         if name.strip().lower() == "content-length" and value.strip().isdecimal():
             self._announced = int(value)
-            if self._announced > self._limit:
+            if self._announced > self._limit and self._status == 200:
                 self._too_long()
 
     def data(self, piece: bytes) -> None:
