@@ -67,6 +67,7 @@ class Shelf:
         self._ledger = Ledger(self.metadata, self._keys, expiry)
         self._limits = limits or Limits()
         self._manifests: dict[str, Manifest] = {}  # by hash and path: a package never changes
+        self._seen: tuple[tuple[int, int], list[Offer]] | None = None  # state of the timestamp's file, and what was on offer
         self.custody = Custody(self._ledger)
 
     @property
@@ -181,11 +182,23 @@ class Shelf:
 
     def offers(self, *, yanked: bool = False) -> list[Offer]:
         """Return all packages on offer, and those taken off it when wanted; see `manifests`."""
+        state = self._state()
+        if not yanked and self._seen is not None and self._seen[0] == state:
+            return list(self._seen[1])
         lists = self._ledger.read()
-        found = list(self._offers(lists))
-        if yanked:
-            found += self._yanked(lists)
-        return sorted(found, key=lambda offer: (offer.manifest.name, offer.manifest.version.key))
+        found = [*self._offers(lists), *(self._yanked(lists) if yanked else ())]
+        found.sort(key=lambda offer: (offer.manifest.name, offer.manifest.version.key))
+        if not yanked:
+            self._seen = (state, list(found))
+        return found
+
+    def _state(self) -> tuple[int, int]:
+        """What changes with every change of the store, by whichever process."""
+        try:
+            status = (self.metadata / "timestamp.json").stat()
+        except OSError:
+            return (0, 0)
+        return (status.st_mtime_ns, status.st_ino)
 
     def unpack(self, name: str, version: str, folder: Path) -> None:
         """Unpack a package on offer into a new folder.
