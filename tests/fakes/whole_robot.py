@@ -337,3 +337,21 @@ def whole_robot(robot: WholeRobot, *names: str) -> Iterator[WholeRobot]:
         yield robot
     finally:
         robot.close()
+
+
+def inside(runs: Path, program: str) -> int | None:
+    """Process id of a program in the sandbox of a run that has a package (a spare has none yet), if there is one."""
+    folders = [path.parent for path in runs.glob("*/package") if any(path.iterdir())]
+    tops = {pid for folder in folders for pid in running_of(folder)}
+    parents = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            parents[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
+    for pid in sorted(parents):
+        with suppress(OSError):
+            above, words = pid, Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
+            while above not in tops and above in parents:
+                above = parents[above]
+            if above in tops and program in words:
+                return pid
+    return None
