@@ -13,7 +13,7 @@ from rapp_cloud.accounts import Accounts
 from rapp_cloud.app import open_shelf, running_cloud
 from rapp_cloud.config import CloudConfig, load_config
 from rapp_cloud.files import write_whole
-from rapp_cloud.keys import passphrase_from
+from rapp_cloud.keys import PASSPHRASE, passphrase_from
 from rapp_cloud.profiles import Profile, Profiles
 from rapp_cloud.tls import CERTIFICATE, make_certificate
 from rapp_hop.errors import HopError
@@ -49,7 +49,9 @@ def _options(words: list[str]) -> CloudConfig:
     parser.add_argument("--passphrase-file", type=Path, metavar="FILE", help="of the store's keys; default: beside them")
     parser.add_argument("--workers", type=int, help="processes for interpretation")
     options = vars(parser.parse_args(words))
-    return load_config(options.pop("data"), options, os.environ)
+    config = load_config(options.pop("data"), options, os.environ)
+    os.environ.pop(PASSPHRASE, None)  # our workers have no business with it
+    return config
 
 
 async def _serve(config: CloudConfig) -> int:

@@ -45,9 +45,9 @@ class Passphrase:
 
 def passphrase_from(environment: Mapping[str, str], file: Path | None = None) -> Passphrase:
     """Return what the environment, or an option that goes before it, says."""
-    if file is None and PASSPHRASE_FILE in environment:
+    if file is None and environment.get(PASSPHRASE_FILE):
         file = Path(environment[PASSPHRASE_FILE])
-    return Passphrase(None if file else environment.get(PASSPHRASE), file)
+    return Passphrase(None if file else environment.get(PASSPHRASE) or None, file)
 
 
 class KeyRing:

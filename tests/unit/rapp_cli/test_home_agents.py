@@ -44,10 +44,11 @@ def test_words_reach_an_agent_as_they_are(tmp_path: Path) -> None:
     assert shlex.split(found["x"].command) == ["setpriv", "--pdeathsig", "TERM", *words]
 
 
-def test_the_mail_password_reaches_the_link_alone(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("secret", "owner"), [("RAPP_SMTP_PASSWORD", "link"), ("RAPP_CLOUD_PASSPHRASE", "cloud")])
+def test_a_secret_reaches_its_agent_alone(tmp_path: Path, secret: str, owner: str) -> None:
     found = programs(tmp_path, agents(HOME, SIMULATED))
-    told: Mapping[str, str] = {name: config.environment.get("RAPP_SMTP_PASSWORD") for name, config in found.items()}
-    assert told.pop("link") is None  # what the supervisor itself has
+    told: Mapping[str, str] = {name: config.environment.get(secret) for name, config in found.items()}
+    assert told.pop(owner) is None  # what the supervisor itself has
     assert set(told.values()) == {""}
 
 

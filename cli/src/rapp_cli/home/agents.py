@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from rapp_cli.cloud import foreign_cloud, link_environment, own_cloud
 from rapp_cli.home.place import Home, Settings
 from rapp_cli.mail_account import MailAccount
+from rapp_cloud.keys import PASSPHRASE
 
-PASSWORD = "RAPP_SMTP_PASSWORD"
 NOT_OURS = ("ROS_NAMESPACE", "ROS_HOSTNAME")  # of the user's own ROS; they would move our names and addresses
 CORE = "core_agent"
 LINK = "link"
+CLOUD = "cloud"
+SECRETS = {"RAPP_SMTP_PASSWORD": LINK, PASSPHRASE: CLOUD}  # variables of the environment, and which agent they are for
 RECORDER = "recorder"
 
 
@@ -31,7 +33,7 @@ def agents(home: Home, settings: Settings) -> list[Agent]:
     if settings.mail is None:
         table.append(_module("mail", "rapp_cloud.mail", "--port", str(ports["mail"]), "--maildir", str(home.maildir)))
     if settings.cloud is None:
-        table.append(_module("cloud", "rapp_cloud", "--port", str(ports["cloud"]), "--data", str(home.cloud)))
+        table.append(_module(CLOUD, "rapp_cloud", "--port", str(ports["cloud"]), "--data", str(home.cloud)))
     if settings.robot is None:
         words = ("--port", str(ports["nao_sim"]), "--files", robot, *settings.simulator)
         table.append(_module("nao_sim", "rapp_nao_sim", *words))

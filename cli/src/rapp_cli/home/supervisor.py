@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from rapp_cli.errors import CommandError
-from rapp_cli.home.agents import LINK, PASSWORD, Agent
+from rapp_cli.home.agents import SECRETS, Agent
 from rapp_cli.home.place import Home
 
 STOP = 8  # s from SIGTERM to SIGKILL for an agent
@@ -78,13 +78,13 @@ class Process:
 
 
 def configuration(agents: Sequence[Agent]) -> str:
-    """The supervisor's configuration file; the agents get its environment, the mail password only for the link."""
+    """The supervisor's configuration file; the agents get its environment, each secret only who needs it."""
     text = _HEAD
     for priority, agent in enumerate(agents, start=1):
         words = shlex.join(agent.words).replace("%", "%%")
         text += _PROGRAM.format(name=agent.name, words=words, priority=priority, stop=STOP)
-        if agent.name != LINK:
-            text += f'environment={PASSWORD}=""\n'
+        withheld = ",".join(f'{name}=""' for name, owner in SECRETS.items() if agent.name != owner)
+        text += f"environment={withheld}\n"
     return text
 
 
