@@ -9,11 +9,11 @@ import signal
 import sys
 from pathlib import Path
 
-from rapp_cloud.accounts import Accounts
 from rapp_cloud.app import open_shelf, running_cloud
 from rapp_cloud.config import CloudConfig, load_config
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import PASSPHRASE, passphrase_from
+from rapp_cloud.memory import open_memory
 from rapp_cloud.profiles import Profile, Profiles
 from rapp_cloud.tls import CERTIFICATE, make_certificate
 from rapp_hop.errors import HopError
@@ -45,7 +45,6 @@ def _options(words: list[str]) -> CloudConfig:
     parser.add_argument("--certificate", type=Path, metavar="FILE", help="for TLS; default: none on loopback")
     parser.add_argument("--certificate-key", type=Path, metavar="FILE", help="its key")
     parser.add_argument("--publish", action="append", metavar="DIR", help="source of a RApp to offer; may be repeated")
-    parser.add_argument("--token-file", type=Path, metavar="FILE", help="default: DIR/tokens.json")
     parser.add_argument("--passphrase-file", type=Path, metavar="FILE", help="of the store's keys; default: beside them")
     parser.add_argument("--workers", type=int, help="processes for interpretation")
     options = vars(parser.parse_args(words))
@@ -81,7 +80,8 @@ def _init(words: list[str]) -> int:
     token_file = data / "robots" / f"{robot}.token"
     if not token_file.exists():
         token_file.parent.mkdir(exist_ok=True, mode=0o700)
-        write_whole(token_file, Accounts(data / "tokens.json").add(robot).encode(), mode=0o600)
+        with open_memory(data, load_config(data, {}, os.environ).database) as memory:
+            write_whole(token_file, memory.accounts.add(robot).encode(), mode=0o600)
     if not (data / "profiles" / f"{robot}.json").exists():
         Profiles(data / "profiles").put(robot, Profile(robot, "en", ()))
     given = [token_file, data / "root.json"]

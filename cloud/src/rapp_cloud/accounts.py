@@ -1,64 +1,89 @@
-"""Who a token is: `tokens.json` maps each robot's secret token to its name (mode 0600, read again when it changes)."""
+"""Who a token is. The database keeps the tokens' hashes; callers are known from memory, so no call waits for the database."""
 
-import hmac
+import hashlib
+import logging
 import secrets
+import time
+from collections.abc import Mapping
 from pathlib import Path
 
-from rapp_cloud.files import read_json, write_whole
-from rapp_hop import strict_json
+import sqlalchemy as sa
+
+from rapp_cloud.database.engine import Database
+from rapp_cloud.database.tables import marks, tokens
+from rapp_cloud.files import read_json
 from rapp_hop.errors import Invalid
 from rapp_hop.hz.text import check_name
 
 MAX_BYTES = 2**20  # of tokens.json
 MIN_TOKEN, MAX_TOKEN = 16, 256  # characters
+_MARK = "tokens"
+_log = logging.getLogger(__name__)
 
 
 class Accounts:
-    """The tokens of one platform."""
+    """The tokens of one platform. All but `robot_of` is blocking."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._seen: tuple[int, int] | None = None
-        self._tokens: dict[bytes, str] = {}
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._known: dict[str, str] = {}  # hash to robot; replaced whole, never changed
+        self._mark: int | None = None
 
     def robot_of(self, token: str | None) -> str | None:
-        """Return the robot that a token names, or None. Its time does not depend on how much of a token is right.
-
-        :raises Invalid: when tokens.json is broken
-        """
+        """Return the robot that a token names, or None. By its hash: how long it takes tells nothing of the right one."""
         if token is None or not MIN_TOKEN <= len(token) <= MAX_TOKEN:
             return None
-        self._reload()
-        given = token.encode("utf-8", "replace")
-        found = None
-        for known, robot in self._tokens.items():
-            if hmac.compare_digest(known, given):
-                found = robot
-        return found
+        return self._known.get(_hash(token))
+
+    def refresh(self) -> None:
+        """See what other processes have changed since; the first time, everything.
+
+        :raises HopError: see `Database.reading`
+        """
+        with self._database.reading() as connection:
+            mark = connection.execute(sa.select(marks.c.value).where(marks.c.name == _MARK)).scalar()
+            if mark == self._mark and mark is not None:
+                return
+            rows = connection.execute(sa.select(tokens.c.hash, tokens.c.robot)).all()
+        self._known, self._mark = {row.hash: row.robot for row in rows}, mark
 
     def add(self, robot: str) -> str:
-        """Make a new token for a robot, keep it and return it."""
+        """Make a new token for a robot, keep its hash and return it."""
         token = secrets.token_urlsafe(32)
-        known = self._read() if self._path.exists() else {}
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        text = strict_json.dumps({**known, token: check_name(robot)})
-        write_whole(self._path, text.encode(), mode=0o600)
+        self._keep({token: check_name(robot)})
         return token
 
-    def _reload(self) -> None:
-        try:
-            status = self._path.stat()
-        except OSError:
-            self._tokens, self._seen = {}, None
-            return
-        if (status.st_mtime_ns, status.st_ino) != self._seen:
-            self._tokens = {token.encode(): robot for token, robot in self._read().items()}
-            self._seen = (status.st_mtime_ns, status.st_ino)
+    def adopt(self, path: Path) -> None:
+        """Take over tokens.json of an older platform: keep the hashes, remove the file.
 
-    def _read(self) -> dict[str, str]:
-        found = read_json(self._path, MAX_BYTES)
+        :raises Invalid: when it is broken
+        """
+        if not path.exists():
+            return
+        found = read_json(path, MAX_BYTES)
         if not isinstance(found, dict) or not all(isinstance(robot, str) for robot in found.values()):
-            raise Invalid("cannot read tokens.json: it must map tokens to names of robots")
+            raise Invalid(f"cannot read {path.name}: it must map tokens to names of robots")
         if any(not MIN_TOKEN <= len(token) <= MAX_TOKEN for token in found):
-            raise Invalid(f"cannot read tokens.json: a token must have {MIN_TOKEN} to {MAX_TOKEN} characters")
-        return {token: check_name(robot) for token, robot in found.items()}
+            raise Invalid(f"cannot read {path.name}: a token must have {MIN_TOKEN} to {MAX_TOKEN} characters")
+        self._keep({token: check_name(robot) for token, robot in found.items()})
+        path.unlink()
+        _log.info("tokens: %d taken over from %s, which is gone", len(found), path.name)
+
+    def _keep(self, given: Mapping[str, str]) -> None:
+        rows = [{"hash": _hash(token), "robot": robot, "created": time.time()} for token, robot in given.items()]
+        with self._database.writing() as connection:
+            known = set(connection.execute(sa.select(tokens.c.hash)).scalars())
+            new = [row for row in rows if row["hash"] not in known]
+            if new:
+                connection.execute(sa.insert(tokens), new)
+            _raise_mark(connection)
+        self.refresh()
+
+
+def _raise_mark(connection: sa.Connection) -> None:
+    if not connection.execute(sa.update(marks).where(marks.c.name == _MARK).values(value=marks.c.value + 1)).rowcount:
+        connection.execute(sa.insert(marks).values(name=_MARK, value=1))
+
+
+def _hash(token: str) -> str:
+    return hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()

@@ -9,7 +9,6 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from rapp_cloud.accounts import Accounts
 from rapp_cloud.cloud_agents.agents import CloudAgents, Quota
 from rapp_cloud.cloud_agents.doors import Doors
 from rapp_cloud.cloud_agents.engine import LocalProcesses
@@ -17,8 +16,8 @@ from rapp_cloud.cloud_agents.packages import Packages
 from rapp_cloud.config import CloudConfig
 from rapp_cloud.interpreter.port import Commands, Interpretation, Interpreter
 from rapp_cloud.keys import Passphrase
+from rapp_cloud.memory import Memory, remembering
 from rapp_cloud.profiles import Profiles
-from rapp_cloud.reports import Reports
 from rapp_cloud.robots import Robots
 from rapp_cloud.services.agents import agent_calls, agent_services
 from rapp_cloud.services.people import people_services
@@ -60,11 +59,18 @@ async def running_cloud(config: CloudConfig) -> AsyncIterator[int]:
     """
     shelf = open_shelf(config.data, Passphrase(config.passphrase, config.passphrase_file))
     await asyncio.to_thread(_prepare, shelf, config)
-    workers, robots = Workers(load_interpreter, config.workers), Robots(time.monotonic, config.lease)
-    doors = Doors(config.data / "agents", config.data / "uploads", Accounts(config.tokens).robot_of)
+    robots = Robots(time.monotonic, config.lease)
+    async with remembering(config.data, config.database, robots) as memory, _serving(config, shelf, robots, memory) as port:
+        yield port
+
+
+@asynccontextmanager
+async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Memory) -> AsyncIterator[int]:
+    workers = Workers(load_interpreter, config.workers)
+    doors = Doors(config.data / "agents", config.data / "uploads", memory.accounts.robot_of)
     agents = _cloud_agents(config, shelf, robots, doors)
     tls = server_tls(*config.tls_files) if config.tls_files else None
-    server = HopServer(_registry(config, shelf, workers, robots, agents), doors.caller, config.data / "uploads", [
+    server = HopServer(_registry(config, shelf, workers, robots, agents, memory), doors.caller, config.data / "uploads", [
         store_files("/tuf/metadata/", shelf.metadata),
         store_files("/tuf/targets/", shelf.targets),
         weblets(shelf, "https" if tls else "http"),
@@ -100,13 +106,15 @@ def _cloud_agents(config: CloudConfig, shelf: Shelf, robots: Robots, doors: Door
     return CloudAgents(engine, Packages(shelf, folder / "packages"), robots.is_here, Quota(config.agents_of_one, config.agents))
 
 
-def _registry(config: CloudConfig, shelf: Shelf, workers: Workers, robots: Robots, agents: CloudAgents) -> ServiceRegistry:
+def _registry(
+    config: CloudConfig, shelf: Shelf, workers: Workers, robots: Robots, agents: CloudAgents, memory: Memory
+) -> ServiceRegistry:
     run = functools.partial(_interpret, workers, config.interpret_timeout)
     return ServiceRegistry(
         [
             *presence_services(robots, shelf),
             *people_services(Profiles(config.data / "profiles")),
-            *run_services(Reports(config.data / "reports")),
+            *run_services(memory.reports),
             *voice_services(robots, shelf, run),
             *agent_services(agents, robots),
             *sight_services(),

@@ -14,7 +14,7 @@ FILE = "cloud.toml"
 PREFIX = "RAPP_CLOUD_"
 _TYPES: dict[str, type[Any]] = {
     "address": str, "passphrase": str, "port": int, "workers": int, "agents": int, "agents_of_one": int,
-    "token_file": Path, "passphrase_file": Path, "certificate": Path, "certificate_key": Path,
+    "database": str, "passphrase_file": Path, "certificate": Path, "certificate_key": Path,
 }  # fmt: skip  # others: float
 
 
@@ -27,7 +27,7 @@ class CloudConfig:
     port: int = 9001  # 0: any free one
     certificate: Path | None = None  # PEM, for TLS; None: none on loopback, else what `init --host` made
     certificate_key: Path | None = None  # PEM; None: <data>/tls/key.pem
-    token_file: Path | None = None  # None: <data>/tokens.json
+    database: str | None = field(default=None, repr=False)  # URL, may hold a password; None: SQLite in the data folder
     passphrase: str | None = field(default=None, repr=False)  # of the store's keys; only from the environment
     passphrase_file: Path | None = None  # the same out of a file; neither: beside the keys
     publish: tuple[Path, ...] = ()  # sources of RApps to offer at start
@@ -37,11 +37,6 @@ class CloudConfig:
     agents: int = 32  # cloud agents at once
     agents_of_one: int = 4  # of one robot
     refresh: float = 3600.0  # seconds between two new timestamps of the store
-
-    @property
-    def tokens(self) -> Path:
-        """The file of tokens."""
-        return self.token_file or self.data / "tokens.json"
 
     @property
     def tls_files(self) -> tuple[Path, Path] | None:
@@ -83,6 +78,8 @@ def _typed(name: str, value: Any) -> Any:
         return tuple(Path(item) for item in value)
     kind = _TYPES.get(name, float)
     try:
+        if isinstance(value, bool) or (kind in (str, Path) and not isinstance(value, str | Path)):
+            raise TypeError
         found = kind(value)
     except (TypeError, ValueError):
         raise Invalid(f"cannot use {value!r} as the setting {name}: it must be of type {kind.__name__}") from None

@@ -10,7 +10,9 @@ LEASE = 15.0  # seconds without a heartbeat after which a robot counts as gone
 
 
 @dataclass(frozen=True)
-class _Registration:
+class Lease:
+    """One robot's."""
+
     kind: RobotKind
     until: float  # seconds of the clock
 
@@ -26,11 +28,11 @@ class Robots:
         """
         self._clock = clock
         self.lease = lease
-        self._robots: dict[str, _Registration] = {}
+        self._robots: dict[str, Lease] = {}
 
     def register(self, robot: str, kind: RobotKind) -> None:
         """Note that a robot is here and what it is; again is fine."""
-        self._robots[robot] = _Registration(kind, self._clock() + self.lease)
+        self._robots[robot] = Lease(kind, self._clock() + self.lease)
 
     def heartbeat(self, robot: str) -> bool:
         """Renew a lease; false when there is none to renew, so that the robot registers again."""
@@ -54,7 +56,22 @@ class Robots:
             raise Refused(f"cannot serve {robot}: it is not registered, call register first")
         return found.kind
 
-    def _alive(self, robot: str) -> _Registration | None:
+    def now(self) -> float:
+        """Return the time of the clock by which leases run."""
+        return self._clock()
+
+    def leases(self) -> dict[str, Lease]:
+        """Return all of them, those that have just ended too."""
+        return dict(self._robots)
+
+    def resume(self, robot: str, kind: RobotKind, left: float) -> None:
+        """Let a robot be here that another process has registered.
+
+        :param left: seconds of its lease
+        """
+        self._robots[robot] = Lease(kind, self._clock() + min(left, self.lease))
+
+    def _alive(self, robot: str) -> Lease | None:
         found = self._robots.get(robot)
         if found is not None and found.until <= self._clock():
             del self._robots[robot]

@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from fakes.packages import source_folder
+from rapp_cloud.memory import open_memory
 from rapp_hop.client import HopClient
 from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
 from rapp_hop.hz.delivery import Delivery, DeliveryLimits
@@ -103,7 +104,7 @@ def test_init_keeps_secrets_private_and_may_be_repeated(platform: Platform) -> N
     assert platform.command("init", "--data", str(platform.data), "--robot", "nao").returncode == 0
     assert platform.command("init", "--data", str(platform.data), "--robot", "other").returncode == 0
     assert (platform.token, platform.root) == before
-    for path in ("robots/nao.token", "robots/other.token", "tokens.json", "keys/root.pem", "profiles/nao.json"):
+    for path in ("robots/nao.token", "robots/other.token", "platform.sqlite", "keys/root.pem", "profiles/nao.json"):
         assert (platform.data / path).stat().st_mode & 0o077 == 0
     assert (platform.data / "robots/other.token").read_text() != platform.token
 
@@ -136,7 +137,8 @@ def test_the_robot_s_day(platform: Platform, tmp_path: Path) -> None:
         assert await delivery.remove("voice_mail")
 
     platform.run(test)
-    assert json.loads((platform.data / "reports/nao/r-1.json").read_text())["outcome"] == "done"
+    with open_memory(platform.data) as memory:
+        assert memory.reports.of("nao") == [{"run": "r-1", "outcome": "done"}]
     assert platform.token not in platform.log.read_text()
 
 
@@ -235,12 +237,12 @@ def test_without_init_it_says_what_to_do(tmp_path: Path) -> None:
         "/tuf/keys/root.pem",
         "/tuf/metadata/../../keys/root.pem",
         "/tuf/metadata/%2e%2e/%2e%2e/keys/root.pem",
-        "/tuf/targets/..%2f..%2ftokens.json",
-        "/tuf/targets/%252e%252e%252ftokens.json",
+        "/tuf/targets/..%2f..%2fplatform.sqlite",
+        "/tuf/targets/%252e%252e%252fplatform.sqlite",
         "/tuf/metadata/",
         "/tuf/metadata/.hidden",
         "/tuf/metadata/a%00b",
-        "/tokens.json",
+        "/platform.sqlite",
         "//etc/passwd",
     ],
 )

@@ -1,0 +1,54 @@
+"""The tables, as the newest migration leaves them; a test holds the two against each other. Times are UTC, seconds since 1970."""
+
+from sqlalchemy import Column, Double, Index, Integer, MetaData, String, Table, Text
+
+NAME = String(100)
+HASH = String(64)  # SHA-256, hexadecimal
+
+metadata = MetaData()
+
+tokens = Table(
+    "tokens",
+    metadata,
+    Column("hash", HASH, primary_key=True),
+    Column("robot", NAME, nullable=False),
+    Column("created", Double, nullable=False),
+)
+"""Who may call. Only the hash of a token is kept."""
+
+marks = Table("marks", metadata, Column("name", NAME, primary_key=True), Column("value", Integer, nullable=False))
+"""Numbers that grow with every change of something, so that other processes see it cheaply."""
+
+robots = Table(
+    "robots",
+    metadata,
+    Column("name", NAME, primary_key=True),
+    Column("kind", NAME, nullable=False),
+    Column("api_version", String(32), nullable=False),
+    Column("until", Double, nullable=False),
+)
+"""Robots that have registered, and until when their lease holds."""
+
+runs = Table(
+    "runs",
+    metadata,
+    Column("robot", NAME, primary_key=True),
+    Column("run", NAME, primary_key=True),
+    Column("received", Double, nullable=False),
+    Column("report", Text, nullable=False),
+    Index("runs_by_time", "robot", "received"),
+)
+"""What robots told of their runs; the report is JSON."""
+
+audit = Table(
+    "audit",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    Column("at", Double, nullable=False),
+    Column("who", NAME, nullable=False),
+    Column("deed", NAME, nullable=False),
+    Column("subject", String(200), nullable=False),
+    Column("detail", Text, nullable=False),
+    Column("seal", HASH, nullable=False),
+)
+"""Who did what. Triggers refuse to change or delete a row; see `rapp_cloud.audit` for the seal."""

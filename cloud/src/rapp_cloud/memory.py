@@ -1,0 +1,89 @@
+"""All that a platform keeps in its database: opened, brought up to date, kept in step while it serves, closed."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
+
+from rapp_cloud.accounts import Accounts
+from rapp_cloud.audit import Audit
+from rapp_cloud.database.engine import FILE, Database
+from rapp_cloud.registrations import Registrations
+from rapp_cloud.reports import Reports
+from rapp_cloud.robots import Robots
+from rapp_hop.errors import HopError
+
+STEP = 0.5  # seconds in which the process sees what a command has changed, and in which leases are written
+_log = logging.getLogger(__name__)
+
+
+class Memory:
+    """The parts that share one database."""
+
+    def __init__(self, database: Database, folder: Path) -> None:
+        self.database = database
+        self.accounts = Accounts(database)
+        self.audit = Audit(database, folder)
+        self.reports = Reports(database)
+
+
+@contextmanager
+def open_memory(data: Path, url: str | None = None) -> Iterator[Memory]:
+    """Open a platform's database and bring it up to date, with what older platforms kept in files. Blocking.
+
+    :param url: None: SQLite in the data folder
+    :raises HopError: when it cannot be used
+    """
+    memory = _open(data, url)
+    try:
+        yield memory
+    finally:
+        memory.database.close()
+
+
+@asynccontextmanager
+async def remembering(data: Path, url: str | None, robots: Robots) -> AsyncIterator[Memory]:
+    """`open_memory` for a process that serves: tokens and leases are kept in step with the database until the block ends."""
+    memory = await asyncio.to_thread(_open, data, url)
+    registrations, stop = Registrations(memory.database, robots), asyncio.Event()
+    try:
+        await asyncio.to_thread(registrations.load)
+        stepping = asyncio.create_task(_keep_in_step(memory, registrations, stop))
+        try:
+            yield memory
+        finally:
+            stop.set()
+            await stepping
+    finally:
+        await asyncio.to_thread(memory.database.close)
+
+
+def _open(data: Path, url: str | None) -> Memory:
+    memory = Memory(Database(url or f"sqlite:///{(data / FILE).absolute()}"), data)
+    try:
+        memory.database.migrate()
+        memory.accounts.adopt(data / "tokens.json")
+        memory.reports.adopt(data / "reports")
+        memory.accounts.refresh()
+    except BaseException:
+        memory.database.close()
+        raise
+    return memory
+
+
+async def _keep_in_step(memory: Memory, registrations: Registrations, stop: asyncio.Event) -> None:
+    """Do a step now and then, and one at the end."""
+    well = True
+    while not stop.is_set():
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(stop.wait(), STEP)
+        try:
+            await asyncio.to_thread(memory.accounts.refresh)
+            await asyncio.to_thread(registrations.write)
+            well = True
+        except HopError as error:
+            if well:  # said once, not at every step
+                _log.error("%s; tokens and leases are those of before meanwhile", error)
+            well = False
