@@ -41,6 +41,7 @@ class Node:
         self._lock = threading.Lock()
         self._publishers: dict[str, rospy.Publisher] = {}
         self._heard: dict[str, list[float]] = {}
+        self._late: dict[str, list[float]] = {}  # s
 
     def serve(self, words: dict[str, Any]) -> None:
         """Do it, and answer."""
@@ -83,13 +84,16 @@ class Node:
         return {"count": count}
 
     def listen(self, words: dict[str, Any]) -> dict[str, Any]:
-        """Count the messages of a topic."""
+        """Count the messages of a topic, and how late they come when they begin with the time."""
         times = self._heard[words["topic"]] = [0, 0.0, 0.0]
+        late = self._late[words["topic"]] = []
 
-        def hear(_message: Any) -> None:
+        def hear(message: Any) -> None:
             times[2] = time.monotonic()
             times[1] = times[1] or times[2]
             times[0] += 1
+            if message.data.startswith("T"):
+                late.append(times[2] - float(message.data[1 : message.data.index(";")]))
 
         rospy.Subscriber(words["topic"], String, hear, queue_size=None, tcp_nodelay=True)
         return {}
@@ -102,7 +106,7 @@ class Node:
             time.sleep(1.0)
         count, first, last = times
         times[:] = [0, 0.0, 0.0]
-        return {"count": count, "first": first, "last": last}
+        return {"count": count, "first": first, "last": last, "late": self._late[words["topic"]]}
 
     def call(self, words: dict[str, Any]) -> dict[str, Any]:
         """Call a service one time after another, for so many seconds."""

@@ -26,6 +26,10 @@ class Client(Protocol):
     def is_behind(self) -> bool:
         """Whether much waits for the client, which may well read it soon; False once it was waited for in vain."""
 
+    @property
+    def is_preparing(self) -> bool:
+        """Whether what goes to the client next is still being encoded."""
+
     def when_caught_up(self, call: Callable[[], object]) -> None:
         """Have this called when nothing waits for the client any more, or it is gone."""
 

@@ -28,6 +28,9 @@ class Pace:
                 client.when_caught_up(self._resume)
 
     def _in_vain(self, clients: list[Client]) -> None:
+        if any(client.is_preparing for client in clients):  # it is the bridge that is slow, not they
+            self._timer = asyncio.get_running_loop().call_later(MOMENT, self._in_vain, clients)
+            return
         for client in clients:
             client.give_up()
         self._resume()

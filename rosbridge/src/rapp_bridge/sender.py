@@ -68,6 +68,11 @@ class Sender:
         """Whether more than half of what may wait does, and the client was not waited for in vain."""
         return not self._given_up and self._outbox.waiting > self._limit // 2
 
+    @property
+    def is_preparing(self) -> bool:
+        """Whether what goes next is still being encoded."""
+        return self._next is not None
+
     def when_caught_up(self, call: Callable[[], object]) -> None:
         """Have this called once, when little waits, or the client is gone."""
         self._caught_up.append(call)

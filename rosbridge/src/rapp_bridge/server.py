@@ -133,6 +133,11 @@ class Connection(asyncio.Protocol):
         """Whether much waits for the client."""
         return self._sender.is_behind
 
+    @property
+    def is_preparing(self) -> bool:
+        """Whether what goes to the client next is still being encoded."""
+        return self._sender.is_preparing
+
     def tell(self, level: Level, text: str) -> None:
         """Send a status, if the client wants those of this level."""
         self._do(self._session.tell(level, text))
