@@ -16,6 +16,7 @@ from typing import Any
 
 from rosbridge_client import PATIENCE, Client, connect
 
+CPU_CLOCK = 2  # of a process, to the nanosecond; clock_getcpuclockid(3) makes its number so
 HERE = Path(__file__).parent
 
 
@@ -34,9 +35,8 @@ class Process:
         return self.process.stdout.readline()
 
     def cpu(self) -> float:
-        """Seconds of processor time that its threads have used."""
-        tasks = Path(f"/proc/{self.process.pid}/task").iterdir()
-        return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) / 1e9
+        """Seconds of processor time that it has used."""
+        return time.clock_gettime(~self.process.pid << 3 | CPU_CLOCK)
 
     def memory(self) -> float:
         """Resident memory, MB."""

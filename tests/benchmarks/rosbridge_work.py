@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import statistics
 import time
 from collections.abc import Awaitable, Callable
 from typing import Any
@@ -16,6 +17,7 @@ Measured = tuple[Figures, Figures]
 
 CALL = framed(b'{"op":"call_service","id":"12-34","service":"/bench/call","args":{"data":true}}')
 SECONDS = 1.5  # of calls
+ROUNDS = 5  # of ours and bare ones in turn
 COUNTS = {"small": 20_000, "scan": 3000, "vga": 200, "hd": 60}  # messages of a flood
 SIZES = {"small": 100, "scan": 23_000, "vga": 1_229_100, "hd": 4_915_500}  # bytes of its frames as JSON
 KINDS = {"small": "std_msgs/String", "scan": "sensor_msgs/LaserScan", "vga": "sensor_msgs/Image", "hd": "sensor_msgs/Image"}
@@ -27,18 +29,25 @@ def percentile(values: list[float], part: int) -> float:
 
 
 async def calls(stage: Stage, clients: int) -> Measured:
-    """As many answers as so many clients get, each with one call open."""
-    ours = await _rounds(stage, clients, bare=False)
-    return ours, await _rounds(stage, clients, bare=True)
+    """As many answers as so many clients get, each with one call open; medians of some rounds."""
+    ours, bare = [], []
+    for _ in range(ROUNDS):
+        ours.append(await _round(stage, clients, bare=False))
+        bare.append(await _round(stage, clients, bare=True))
+    return _median(ours), _median(bare)
 
 
-async def _rounds(stage: Stage, count: int, *, bare: bool) -> Figures:
+def _median(rounds: list[Figures]) -> Figures:
+    return {name: statistics.median(each[name] for each in rounds) for name in rounds[0]}
+
+
+async def _round(stage: Stage, count: int, *, bare: bool) -> Figures:
     process = stage.bare if bare else stage.bridge
     async with stage.clients(count, bare=bare) as clients:
         took: list[float] = []
-        await _ask_again(clients, [], 0.2)
+        await _ask_again(clients, [], 0.1)
         before, began = process.cpu(), time.monotonic()
-        await _ask_again(clients, took, SECONDS)
+        await _ask_again(clients, took, SECONDS / ROUNDS)
         span = time.monotonic() - began
         used = process.cpu() - before
     return {
