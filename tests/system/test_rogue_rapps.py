@@ -96,7 +96,7 @@ def size(folder: Path) -> int:
 
 
 @pytest.mark.parametrize("name", ROGUES)
-def test_it_is_gone_and_the_robot_listens_again(robot: WholeRobot, name: str) -> None:
+def test_l04_l05_it_is_gone_and_the_robot_listens_again(robot: WholeRobot, name: str) -> None:
     rogue, since, before = ROGUES[name], len(robot.seen), size(robot.home)
     robot.ask(name)
     here = robot.until(lambda seen: seen.kind == "said" and seen.detail == "here", since)

@@ -100,7 +100,7 @@ def test_a_program_that_cannot_even_run_has_failed(workshop, wait_for, body):
     assert run.outcome is None or run.outcome[0] == "failed"
 
 
-def test_a_process_that_ignores_sigterm_is_killed_with_all_it_has_started(workshop, wait_for):
+def test_l04_a_process_that_ignores_sigterm_is_killed_with_all_it_has_started(workshop, wait_for):
     body = """
 import os, signal, time
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -184,7 +184,7 @@ def test_orphans_are_killed_and_their_folders_removed(tmp_path, wait_for):
     assert not folder.exists()
 
 
-def test_a_process_id_used_again_by_another_is_left_alone(tmp_path):
+def test_l12_a_process_id_used_again_by_another_is_left_alone(tmp_path):
     other = subprocess.Popen(["sleep", "60"], start_new_session=True)
     try:
         folder = tmp_path / "runs" / "old"

@@ -447,7 +447,7 @@ def test_a_rapp_that_cannot_be_started(home: Home) -> None:
     assert failing_round(home) == (["s3", "s4", "s6", "s7", "s11", "s3"], ["I cannot start it"])
 
 
-def test_a_rapp_without_a_first_word(home: Home) -> None:
+def test_l01_a_rapp_without_a_first_word(home: Home) -> None:
     home.agents.script = Script(first_word=None, terminate=None)
     home.start()
     ask(home)
@@ -455,7 +455,7 @@ def test_a_rapp_without_a_first_word(home: Home) -> None:
     assert home.clock.time == pytest.approx(1.0 + 1.1 + 15.0, abs=1.0)
 
 
-def test_a_rapp_that_dies_before_its_first_word_is_not_waited_for(home: Home) -> None:
+def test_l02_a_rapp_that_dies_before_its_first_word_is_not_waited_for(home: Home) -> None:
     home.agents.script = Script(first_word=None, terminate=None, crash=0.2)
     home.start()
     ask(home)

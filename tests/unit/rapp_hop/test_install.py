@@ -1,8 +1,12 @@
 """Installed RApps appear whole or not at all; the version before stays."""
 
+import os
+import shutil
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -79,6 +83,55 @@ def test_p25_the_package_must_be_who_was_asked_for(rapps: RappFolder, tmp_path: 
     with pytest.raises(Invalid, match=r"the package says it is hello 1\.0\.0"):
         install(package(tmp_path, "1.0.0", says="2.0.0"), rapps)
     assert rapps.list() == {}
+
+
+WRITES = ("mkdir", "open", "fsync", "rename", "replace", "symlink", "unlink", "rmdir")
+
+
+def install_until_the_power_fails(rapps: RappFolder, source: PackageFile, writes: int) -> bool:
+    """Install in a process that is gone, without a farewell, before its write of that number; gives whether it came to its end."""
+    child = os.fork()
+    if child:
+        return os.waitpid(child, 0)[1] == 0
+    left = [writes]
+
+    def cut(work: Callable[..., Any]) -> Callable[..., Any]:
+        def cut_or_do(*words: Any, **more: Any) -> Any:
+            left[0] -= 1
+            if left[0] < 0:
+                os._exit(9)
+            return work(*words, **more)
+
+        return cut_or_do
+
+    for name in WRITES:
+        setattr(os, name, cut(getattr(os, name)))
+    try:
+        install(source, rapps)
+    finally:
+        os._exit(0)
+
+
+def test_l08_a_power_cut_at_every_write_leaves_the_version_before_or_the_new_one(rapps: RappFolder, tmp_path: Path) -> None:
+    install(package(tmp_path, "1.0.0"), rapps)
+    update, before = package(tmp_path, "1.1.0"), tmp_path / "before"
+    rapps.root.rename(before)
+    seen = set()
+    for writes in range(1000):
+        shutil.copytree(before, rapps.root, symlinks=True)
+        ended = install_until_the_power_fails(rapps, update, writes)
+        there = rapps.find("hello")
+        assert there is not None
+        assert (there.path / "agent.py").read_text() == f"print({there.version!r})\n"
+        seen.add(there.version)
+        install(update, rapps)
+        assert {path.name for path in rapps.root.iterdir()} == {".lock", "hello"}
+        assert {path.name for path in (rapps.root / "hello").iterdir()} == {"1.0.0", "1.1.0", "current", "previous"}
+        shutil.rmtree(rapps.root)
+        if ended:
+            break
+    assert ended and writes > 10
+    assert seen == {"1.0.0", "1.1.0"}
 
 
 def test_what_a_power_cut_left_is_swept_up(rapps: RappFolder, tmp_path: Path) -> None:

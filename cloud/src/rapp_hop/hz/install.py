@@ -187,6 +187,8 @@ class RappFolder:
             with held(self.root / ".lock", "install"):
                 for path in self.root.glob(f"{_ASIDE}*"):
                     shutil.rmtree(path, ignore_errors=True)
+                for link in self.root.glob(f"*/{_ASIDE}*"):
+                    link.unlink()
                 yield
         except OSError as error:
             step = "free some space" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "check the folder"
