@@ -1,4 +1,4 @@
-"""`python -m rapp_cloud`: serve; `… init`: make a platform and a robot's token; `… publish`: offer a RApp."""
+"""`python -m rapp_cloud`: serve; `… init`: make a platform and a token; `… publish`: offer a RApp; see `administration` too."""
 
 import argparse
 import asyncio
@@ -9,6 +9,9 @@ import signal
 import sys
 from pathlib import Path
 
+import uvloop
+
+from rapp_cloud.administration import COMMANDS
 from rapp_cloud.app import open_shelf, running_cloud
 from rapp_cloud.config import CloudConfig, load_config
 from rapp_cloud.files import write_whole
@@ -25,11 +28,12 @@ def main(words: list[str] | None = None) -> int:
     """Run the command that the words name; return its exit status."""
     words = sys.argv[1:] if words is None else words
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s")
-    commands = {"init": _init, "publish": _publish}
+    commands = {"init": _init, "publish": _publish, **COMMANDS}
     try:
         if words and words[0] in commands:
             return commands[words[0]](words[1:])
-        return asyncio.run(_serve(_options(words)))
+        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+            return runner.run(_serve(_options(words)))
     except HopError as error:
         print(error, file=sys.stderr)
     except OSError as error:
@@ -38,7 +42,9 @@ def main(words: list[str] | None = None) -> int:
 
 
 def _options(words: list[str]) -> CloudConfig:
-    parser = argparse.ArgumentParser("python -m rapp_cloud", description="The RAPP platform; commands: init, publish.")
+    parser = argparse.ArgumentParser(
+        "python -m rapp_cloud", description="The RAPP platform; commands: init, publish, " + ", ".join(COMMANDS)
+    )
     parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="made by `init`")
     parser.add_argument("--port", type=int, help="0: any free one")
     parser.add_argument("--address", help="to listen on")

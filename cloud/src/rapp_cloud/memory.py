@@ -60,8 +60,13 @@ async def remembering(data: Path, url: str | None, robots: Robots) -> AsyncItera
         await asyncio.to_thread(memory.database.close)
 
 
+def url_of(data: Path, url: str | None) -> str:
+    """Return the URL of a platform's database: the one it was given, or SQLite in its data folder."""
+    return url or f"sqlite:///{(data / FILE).absolute()}"
+
+
 def _open(data: Path, url: str | None) -> Memory:
-    memory = Memory(Database(url or f"sqlite:///{(data / FILE).absolute()}"), data)
+    memory = Memory(Database(url_of(data, url)), data)
     try:
         memory.database.migrate()
         memory.accounts.adopt(data / "tokens.json")

@@ -78,9 +78,10 @@ class Database:
         with _translated(), self._engine.connect().execution_options(writes=True) as connection, connection.begin():
             yield connection
 
-    def migrate(self) -> None:
+    def migrate(self, revision: str = "head") -> None:
         """Make the tables, or bring those of an older version up to date; all of it or nothing.
 
+        :param revision: to stop at
         :raises Refused: when a newer version of the platform has been here
         :raises HopError: as `reading`
         """
@@ -95,7 +96,7 @@ class Database:
             config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
             config.attributes["connection"] = connection
             try:
-                alembic.command.upgrade(config, "head")
+                alembic.command.upgrade(config, revision)
             except alembic.util.CommandError:
                 raise Refused("cannot use the database: a newer version of the platform has changed it, start that one") from None
 
