@@ -5,6 +5,7 @@ import asyncio
 import json
 import logging
 import os
+import resource
 import signal
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import uvloop
 
 from rapp_cloud.administration import COMMANDS
 from rapp_cloud.app import open_shelf, running_cloud
-from rapp_cloud.config import CloudConfig, load_config
+from rapp_cloud.config import PREFIX, CloudConfig, load_config
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import PASSPHRASE, passphrase_from
 from rapp_cloud.memory import open_memory
@@ -28,6 +29,7 @@ def main(words: list[str] | None = None) -> int:
     """Run the command that the words name; return its exit status."""
     words = sys.argv[1:] if words is None else words
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s")
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # what is in our memory must not lie about on the disk
     commands = {"init": _init, "publish": _publish, **COMMANDS}
     try:
         if words and words[0] in commands:
@@ -55,7 +57,8 @@ def _options(words: list[str]) -> CloudConfig:
     parser.add_argument("--workers", type=int, help="processes for interpretation")
     options = vars(parser.parse_args(words))
     config = load_config(options.pop("data"), options, os.environ)
-    os.environ.pop(PASSPHRASE, None)  # our workers have no business with it
+    for name in (PASSPHRASE, f"{PREFIX}DATABASE"):  # our workers have no business with them
+        os.environ.pop(name, None)
     return config
 
 
