@@ -21,7 +21,7 @@ from rapp_api.testing import FakeCoreAgent
 from rapp_core.services.table import CORE_SERVICES
 
 pytestmark = pytest.mark.timeout(180)
-SETTINGS = "register_timeout = 0.5\n"
+SETTINGS = "register_timeout = 0.5\nheartbeat = 10.0\n"  # a busy machine may keep the lender from its turns
 NAN, INF = math.nan, math.inf
 PATIENCE = 60.0  # s
 

@@ -26,7 +26,9 @@ class FarRapp:
         return self.begin(function, *args).result(PATIENCE)
 
     def close(self) -> None:
-        """End the process."""
+        """End the process, though it may still wait for something."""
+        for process in list(self._pool._processes.values()):
+            process.kill()
         self._pool.shutdown(cancel_futures=True)
 
 

@@ -1,5 +1,6 @@
 """Clients of the core agent's actions: actionlib's own, known to the core agent by a header that the gate fills in."""
 
+import threading
 from collections.abc import Mapping
 from typing import Any
 
@@ -32,7 +33,17 @@ class ActionClient(SimpleActionClient):  # type: ignore[misc]  # actionlib carri
         action = getattr(rapp_msgs.msg, f"{ACTIONS[name]}Action")
         _announce(f"{name}/goal", getattr(rapp_msgs.msg, f"{ACTIONS[name]}ActionGoal"), header)
         _announce(f"{name}/cancel", GoalID, header)
+        self._sending = threading.RLock()
         super().__init__(name, action)
+
+    def send_goal(self, goal: Any, done_cb: Any = None, active_cb: Any = None, feedback_cb: Any = None) -> None:
+        """As actionlib's, which loses the end of a goal that comes before it has noted that it has sent it."""
+        with self._sending:
+            super().send_goal(goal, done_cb, active_cb, feedback_cb)
+
+    def _handle_transition(self, handle: Any) -> None:
+        with self._sending:  # until the goal that is being sent is noted
+            super()._handle_transition(handle)
 
     def wait_for_server(self, timeout: Any = None) -> bool:
         """As actionlib's; no time-out waits for ever."""
