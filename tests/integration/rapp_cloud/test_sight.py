@@ -136,12 +136,12 @@ def original_call(cloud: CloudProcess, service: str, data: bytes) -> Any:
 def test_four_parallel_calls_take_two_rounds_of_two_workers(cloud: CloudProcess, tmp_path: Path) -> None:
     """Told by the workers' processor time, which a busy machine does not change: each did about two calls' work."""
     picture = tmp_path / "codes.png"
-    codes = [(f"code {x} {y}", 200 + 260 * x, 160 + 260 * y, 140) for x in range(5) for y in range(3)]
-    picture.write_bytes(encoded(draw_codes(*codes, size=(1450, 880))))
+    codes = [(f"code {x} {y}", 200 + 260 * x, 160 + 260 * y, 140) for x in range(3) for y in range(2)]
+    picture.write_bytes(encoded(draw_codes(*codes, size=(960, 600))))
 
     async def look(client: HopClient) -> None:
         found = await client.call("qr_detection", {}, {"file": picture}, 60)
-        assert len(found["qr_messages"]) >= 12
+        assert len(found["qr_messages"]) == 6
 
     async def test(client: HopClient, _other: HopClient) -> None:
         await asyncio.gather(*(look(client) for _ in range(4)))  # starts all workers
