@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,24 @@ def test_it_answers_as_its_person_and_its_services_do() -> None:
         with pytest.raises(Refused):
             cloud.call_wait("unknown")
         assert core.said() == []
+
+
+def test_a_cloud_agent_answers_as_its_services_do_until_it_is_stopped(tmp_path: Path) -> None:
+    services = {"look": lambda arguments: (arguments["picture"].name, arguments["times"])}
+    answers: list[object] = []
+    with FakeCoreAgent(agent_services=services) as core:
+        assert cloud.call_agent_wait("look", {"picture": tmp_path / "door.jpg", "times": 2}) == ("door.jpg", 2)
+        cloud.call_agent("look", {"picture": tmp_path / "x", "times": 1}, answers.append)
+        while not answers:
+            time.sleep(0.01)
+        assert answers == [("x", 1)]
+        assert cloud.stop_agent_wait()
+        assert not cloud.stop_agent_wait()
+        with pytest.raises(Refused):
+            cloud.call_agent_wait("look", {"picture": tmp_path, "times": 2})
+        assert [name for name, _ in core.calls] == ["agent_call", "agent_call", "stop_cloud_agent", "stop_cloud_agent"]
+    with FakeCoreAgent(services=services), pytest.raises(Refused, match="no partner"):
+        cloud.call_agent_wait("look", {"times": 2})
 
 
 def test_it_has_the_limits_of_the_real_one() -> None:

@@ -83,7 +83,11 @@ def test_the_running_rapp_is_the_one_whose_package_is_in_a_run(home: Home) -> No
         (home.robot / "runs" / run / "package").mkdir(parents=True)
     (home.robot / "runs" / "busy" / "package" / "package.json").write_text(json.dumps({"name": "voice_mail"}))
     append(home.timeline, Entry("core", "core", "s9", "entered", "await and execute commands", NOW))
-    assert status.read(home, BOTH).rapp == "voice_mail"
+    assert (status.read(home, BOTH).rapp, status.read(home, BOTH).cloud_agent) == ("voice_mail", None)
+    agent = home.cloud / "agents" / "runs" / "busy" / "package"
+    agent.mkdir(parents=True)
+    (agent / "package.json").write_text(json.dumps({"name": "voice_mail_cloud"}))
+    assert status.read(home, BOTH).cloud_agent == "voice_mail_cloud"
     append(home.timeline, Entry("core", "core", "s3", "entered", "listen", NOW))
     assert status.read(home, BOTH).rapp is None
 
@@ -100,4 +104,6 @@ def test_people_are_told_what_runs_since_when_and_why_not(home: Home) -> None:
     rest = "\n".join(lines[2:])
     for words in ("s3 listen", "(5 s)", "none runs", "the link does not answer", "3 waiting"):
         assert words in rest
+    four = status.text(home, Status(agents, None, "hazard", True, 0, "hazard_cloud"), NOW)
+    assert "RApp        hazard\ncloud agent hazard_cloud" in four
     assert "./rapp up" in status.text(home, Status([], None, None, None, 0), NOW)

@@ -39,6 +39,7 @@ class Status:
     rapp: str | None  # name of the RApp that runs
     registered: bool | None  # with the platform; None: not known, as the link or the rosbridge does not answer
     mails_waiting: int
+    cloud_agent: str | None = None  # name of its package, when the running RApp has one at the home's own platform
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +66,8 @@ def read(home: Home, processes: Mapping[str, Process]) -> Status:
     core = _core(latest(home.timeline), processes)
     running = core is not None and core.state in RUNS_A_RAPP
     registered = asyncio.run(platform.registered(home.settled().bridge, PATIENCE)) if processes else None
-    return Status(agents, core, _rapp(home.robot / "runs") if running else None, registered, _waiting(home.robot))
+    rapp, agent = (_rapp(folder) if running else None for folder in (home.robot / "runs", home.cloud / "agents" / "runs"))
+    return Status(agents, core, rapp, registered, _waiting(home.robot), agent)
 
 
 def _frozen(process: Process) -> Process:
@@ -116,6 +118,7 @@ def text(home: Home, status: Status, now: float) -> str:
         core = status.core
         lines += ["", f"core agent  {f'{core.state} {core.name}, since {_when(core.since, now)}' if core else 'state not known'}"]
         lines += [f"RApp        {status.rapp or 'none runs'}"]
+        lines += [f"cloud agent {status.cloud_agent}"] if status.cloud_agent else []
         standing = {True: "registered", False: "not registered: it is away", None: "not known: the link does not answer"}
         lines += [f"platform    {standing[status.registered]}"]
     return "\n".join([*lines, f"mails       {status.mails_waiting} waiting to be sent"])
