@@ -33,7 +33,7 @@ class CloudProcess:
         self._process: subprocess.Popen[str] | None = None
         for robot in ROBOTS:
             words = [sys.executable, "-m", "rapp_cloud", "init", "--data", str(self.data), "--robot", robot]
-            subprocess.run(words, check=True, timeout=PATIENCE, capture_output=True)
+            subprocess.run(words, env=self._env, check=True, timeout=PATIENCE, capture_output=True)
 
     def start(self) -> None:
         """Start it; returns when it serves."""
@@ -45,6 +45,12 @@ class CloudProcess:
         line = self._process.stdout.readline()
         assert line.startswith("READY "), self.log.read_text()
         self.port = json.loads(line[6:])["port"]
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        assert self._process is not None
+        return self._process.pid
 
     def stop(self, number: int = signal.SIGTERM) -> int:
         """End it; gives its exit status."""

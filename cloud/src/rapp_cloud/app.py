@@ -14,9 +14,11 @@ from rapp_cloud.cloud_agents.doors import Doors
 from rapp_cloud.cloud_agents.engine import LocalProcesses
 from rapp_cloud.cloud_agents.packages import Packages
 from rapp_cloud.config import CloudConfig
+from rapp_cloud.health import checks_of, expiry, health
 from rapp_cloud.interpreter.port import Commands, Interpretation, Interpreter
 from rapp_cloud.keys import Passphrase
 from rapp_cloud.memory import Memory, remembering
+from rapp_cloud.metrics import MeasuredServer, Metrics
 from rapp_cloud.profiles import Profiles
 from rapp_cloud.robots import Robots
 from rapp_cloud.services.agents import agent_calls, agent_services
@@ -33,7 +35,6 @@ from rapp_cloud.weblets import weblets
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
 from rapp_hop.registry import ServiceRegistry
-from rapp_hop.server import HopServer
 from rapp_hop.workers import Workers
 
 _log = logging.getLogger(__name__)
@@ -69,8 +70,13 @@ async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Me
     workers = Workers(load_interpreter, config.workers)
     doors = Doors(config.data / "agents", config.data / "uploads", memory.accounts.robot_of)
     agents = _cloud_agents(config, shelf, robots, doors)
-    tls = server_tls(*config.tls_files) if config.tls_files else None
-    server = HopServer(_registry(config, shelf, workers, robots, agents, memory), doors.caller, config.data / "uploads", [
+    tls_files = config.tls_files
+    tls = server_tls(*tls_files) if tls_files else None
+    metrics = _metrics(robots, agents, tls_files)
+    checks = checks_of(memory, config.data, shelf.metadata / "timestamp.json", tls_files[0] if tls_files else None)
+    registry = _registry(config, shelf, workers, robots, agents, memory)
+    server = MeasuredServer(metrics, registry, doors.caller, config.data / "uploads", [
+        *health(checks, metrics, memory.accounts.robot_of),
         store_files("/tuf/metadata/", shelf.metadata),
         store_files("/tuf/targets/", shelf.targets),
         weblets(shelf, "https" if tls else "http"),
@@ -104,6 +110,16 @@ def _cloud_agents(config: CloudConfig, shelf: Shelf, robots: Robots, doors: Door
     folder = config.data / "agents"
     engine = LocalProcesses(folder, doors.open)
     return CloudAgents(engine, Packages(shelf, folder / "packages"), robots.is_here, Quota(config.agents_of_one, config.agents))
+
+
+def _metrics(robots: Robots, agents: CloudAgents, tls_files: tuple[Path, Path] | None) -> Metrics:
+    metrics = Metrics()
+    metrics.show("rapp_robots", "Robots whose lease holds", robots.count)
+    metrics.show("rapp_cloud_agents", "Cloud agents that run", agents.count)
+    if tls_files:
+        until = expiry(tls_files[0])
+        metrics.show("rapp_certificate_expiry_seconds", "Until when the TLS certificate is good", lambda: until)
+    return metrics
 
 
 def _registry(

@@ -64,6 +64,11 @@ class Robots:
         """Return all of them, those that have just ended too."""
         return dict(self._robots)
 
+    def count(self) -> int:
+        """Return how many are here."""
+        now = self._clock()
+        return sum(lease.until > now for lease in dict(self._robots).values())
+
     def resume(self, robot: str, kind: RobotKind, left: float) -> None:
         """Let a robot be here that another process has registered.
 

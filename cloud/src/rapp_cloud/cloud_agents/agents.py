@@ -110,6 +110,10 @@ class CloudAgents:
         found = ((agent, entry) for agent, entry in self._agents.items() if entry.robot == robot)
         return [{"agent": agent, "rapp": entry.rapp, "run": entry.run} for agent, entry in found]
 
+    def count(self) -> int:
+        """Return how many run, of all robots."""
+        return len(self._agents)
+
     async def send(self, robot: str, agent: str, request: WireRequest, path: str, timeout: float) -> WireAnswer:
         """Pass a call on to one of a robot's agents.
 

@@ -100,6 +100,14 @@ class Database:
             except alembic.util.CommandError:
                 raise Refused("cannot use the database: a newer version of the platform has changed it, start that one") from None
 
+    def check(self) -> None:
+        """See that it can be written to; changes nothing.
+
+        :raises HopError: see `reading`
+        """
+        with self.writing() as connection:
+            connection.exec_driver_sql("SELECT 1")
+
     def close(self) -> None:
         """Close all connections."""
         self._engine.dispose()
