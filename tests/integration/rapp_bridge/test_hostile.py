@@ -118,9 +118,8 @@ def test_a_broken_frame_ends_its_own_connection_only(url: str, sent: bytes, code
             wire = await Wire.open(url)
             wire.raw(sent)
             found, _, said = await wire.ending()
-            # the bytes that come after the end reset the connection, which may overtake the close frame
-            assert found == code or (found == CUT and len(sent) > 1000)
-            assert code != 1009 or found == CUT or "cannot take a message of" in said[0]
+            assert found == code  # though more was on its way
+            assert code != 1009 or "cannot take a message of" in said[0]
             wire.leave()
 
     asyncio.run(story())

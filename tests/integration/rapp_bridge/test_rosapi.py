@@ -80,6 +80,22 @@ def test_parameters_are_set_as_json_and_deleted(clients: Clients) -> None:
     assert ask(clients, "has_param", "/set/here") == {"exists": False}
 
 
+def test_what_parameters_cannot_hold_is_refused_with_the_reason(clients: Clients) -> None:
+    async def story() -> None:
+        async with clients:
+            socket = await clients.new()
+            for value, why in (
+                ("[" * 40 + "]" * 40, "more than 32 deep"),
+                ("null", "no null"),
+                ("1e", "no JSON"),
+                ('"\\u0000"', "XML"),
+            ):
+                answer = await socket.call("/rosapi/set_param", args=["/refused", value])
+                assert (answer["result"], why in answer["values"]) == (False, True), answer
+
+    asyncio.run(story())
+
+
 def test_the_time(clients: Clients) -> None:
     before = time.time()
     assert before - 1 <= ask(clients, "get_time")["time"]["secs"] <= time.time()
