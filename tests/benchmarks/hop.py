@@ -11,32 +11,66 @@ import asyncio
 import json
 import os
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 import uvloop
 
-from benchmarks.bridge import child, cpu, ready_line
-
 TOKEN = "bench-token-0123456789"
 BODY = b'{"value": "hello"}'
-CALL = (
-    f"POST /hop/echo HTTP/1.1\r\nHost: x\r\nAccept-Token: {TOKEN}\r\nContent-Type: application/json\r\n"
-    f"Content-Length: {len(BODY)}\r\n\r\n"
-).encode() + BODY
 RIGHT = b'\r\n\r\n"hello"'
 HERE = Path(__file__).parent
+
+
+def call_of(service: str) -> bytes:
+    head = f"POST /hop/{service} HTTP/1.1\r\nHost: x\r\nAccept-Token: {TOKEN}\r\nContent-Type: application/json\r\n"
+    return f"{head}Content-Length: {len(BODY)}\r\n\r\n".encode() + BODY
+
+
+@contextmanager
+def child(words: list[str]) -> Iterator[subprocess.Popen[str]]:
+    """A process that is ended, and killed when it does not end."""
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HERE.parent), os.environ.get("PYTHONPATH", "")])}
+    process = subprocess.Popen(words, env=env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def ready_of(process: subprocess.Popen[str]) -> dict[str, Any]:
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    if not line.startswith("READY"):
+        raise SystemExit(f"cannot start {process.args}")
+    found: dict[str, Any] = json.loads(line.removeprefix("READY "))
+    return found
+
+
+def cpu(pid: int) -> float:
+    """Processor seconds a process has used."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 class Caller(asyncio.Protocol):
     """One keep-alive connection, one call after another."""
 
-    def __init__(self) -> None:
+    def __init__(self, call: bytes) -> None:
         self.took: list[float] = []
         self.failed = ""
+        self._bytes = call
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = transport
@@ -56,13 +90,14 @@ class Caller(asyncio.Protocol):
     def _call(self) -> None:
         self._answer = b""
         self._began = time.perf_counter()
-        self._transport.write(CALL)  # type: ignore[attr-defined]
+        self._transport.write(self._bytes)  # type: ignore[attr-defined]
 
 
-async def load(port: int, connections: int, seconds: float) -> tuple[float, list[float]]:
+async def load(port: int, call: bytes, connections: int, seconds: float) -> tuple[float, list[float]]:
     """Calls per second, and the seconds of each."""
     loop = asyncio.get_running_loop()
-    callers = [(await loop.create_connection(Caller, "127.0.0.1", port))[1] for _ in range(connections)]
+    made = [await loop.create_connection(lambda: Caller(call), "127.0.0.1", port) for _ in range(connections)]
+    callers = [caller for _, caller in made]
     await asyncio.sleep(seconds / 4)
     for caller in callers:
         caller.took.clear()
@@ -81,31 +116,52 @@ async def load(port: int, connections: int, seconds: float) -> tuple[float, list
 class Server:
     """One of the servers compared."""
 
-    def __init__(self, name: str, words: list[str], stack: ExitStack) -> None:
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HERE.parent), os.environ.get("PYTHONPATH", "")])}
-        process = stack.enter_context(child([sys.executable, *words], env))
-        ready = json.loads(ready_line(process).removeprefix("READY "))
-        self.name = name
+    def __init__(self, words: list[str], stack: ExitStack) -> None:
+        process = stack.enter_context(child([sys.executable, *words]))
+        ready = ready_of(process)
         self.port = ready["port"]
         self.pids = ready.get("pids", [process.pid])
+
+
+class Row:
+    """A service of a server, measured in rounds."""
+
+    def __init__(self, name: str, server: Server, service: str) -> None:
+        self.name = name
+        self._server = server
+        self._call = call_of(service)
         self.rates: list[float] = []
-        self.took: list[float] = []
-        self.used = 0.0
+        self._took: list[float] = []
+        self._used = 0.0
 
     def measure(self, connections: int, seconds: float) -> None:
-        before = sum(map(cpu, self.pids))
-        rate, took = uvloop.run(load(self.port, connections, seconds))
-        self.used += sum(map(cpu, self.pids)) - before
+        before = sum(map(cpu, self._server.pids))
+        rate, took = uvloop.run(load(self._server.port, self._call, connections, seconds))
+        self._used += sum(map(cpu, self._server.pids)) - before
         self.rates.append(rate)
-        self.took += took
+        self._took += took
 
-    def row(self, bare: "Server") -> str:
-        share = statistics.median(mine / theirs for mine, theirs in zip(self.rates, bare.rates, strict=True))
-        millis = sorted(1000 * one for one in self.took)
-        p99 = millis[int(len(millis) * 0.99)]
-        each = self.used / len(self.took) / 1.25 * 1e6  # the warming up counts a quarter more
-        rate = statistics.median(self.rates)
-        return f"{self.name:<34}{rate:>9.0f}{share:>8.2f}{statistics.median(millis):>9.2f}{p99:>9.2f}{each:>12.0f}"
+    @property
+    def each(self) -> float:
+        """Processor microseconds of the server for one call."""
+        return self._used / len(self._took) / 1.25 * 1e6  # the warming up counts a quarter more
+
+    def line(self, first: "Row") -> str:
+        share = statistics.median(mine / theirs for mine, theirs in zip(self.rates, first.rates, strict=True))
+        millis = sorted(1000 * one for one in self._took)
+        figures = (statistics.median(millis), millis[int(len(millis) * 0.99)])
+        end = "".join(f"{one:>9.2f}" for one in figures) + f"{self.each:>12.0f}{first.each / self.each:>10.2f}"
+        return f"{self.name:<34}{statistics.median(self.rates):>9.0f}{share:>8.2f}{end}"
+
+
+def compare(title: str, rows: list[Row], options: argparse.Namespace) -> None:
+    """Measure the rows in turn and print them; shares are of the first."""
+    for _ in range(options.rounds):
+        for row in rows:
+            row.measure(options.connections, options.seconds)
+    print(f"{title:<34}{'calls/s':>9}{'share':>8}{'p50 ms':>9}{'p99 ms':>9}{'CPU us each':>12}{'CPU share':>10}")
+    for row in rows:
+        print(row.line(rows[0]))
 
 
 def main() -> int:
@@ -118,18 +174,16 @@ def main() -> int:
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         (folder / "tokens.json").write_text(json.dumps({TOKEN: "bench"}))
-        ours = ["-m", "rapp_hop", "benchmarks.hop_services", "--rate", "1e9", "--tokens", str(folder / "tokens.json")]
-        ours += ["--uploads", str(folder / "uploads")]
-        bare = Server("bare Tornado handler", [str(HERE / "hop_bare.py")], stack)
-        servers = [bare, Server("HOP, one process", ours, stack)]
-        servers.append(Server(f"HOP, {cores} processes", [*ours, "--processes", str(cores)], stack))
-        for _ in range(options.rounds):
-            for server in servers:
-                server.measure(options.connections, options.seconds)
+        words = ["-m", "rapp_hop", "benchmarks.hop_services", "--rate", "1e9", "--tokens", str(folder / "tokens.json")]
+        words += ["--uploads", str(folder / "uploads")]
+        bare = Server([str(HERE / "hop_bare.py")], stack)
+        one = Server(words, stack)
+        all_ = Server([*words, "--processes", str(cores)], stack)
+        several = f"HOP, {cores} processes"
         print(f"{options.connections} keep-alive connections, {cores} cores, the load on one of them")
-        print(f"{'echo':<34}{'calls/s':>9}{'share':>8}{'p50 ms':>9}{'p99 ms':>9}{'CPU us each':>12}")
-        for server in servers:
-            print(server.row(bare))
+        echoes = [Row("bare Tornado handler", bare, "echo"), Row("HOP, one process", one, "echo"), Row(several, all_, "echo")]
+        compare("echo", echoes, options)
+        compare("2 ms of work", [Row("HOP, one process", one, "burn"), Row(several, all_, "burn")], options)
     return 0
 
 

@@ -13,15 +13,16 @@ import ssl
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tornado.httpserver import HTTPServer
 from tornado.httputil import HTTPConnection, HTTPMessageDelegate, HTTPServerConnectionDelegate
-from tornado.netutil import add_accept_handler, bind_sockets, bind_unix_socket
+from tornado.netutil import bind_sockets, bind_unix_socket
 
+from rapp_hop.accepting import Door
 from rapp_hop.callers import check_origin, token_of
 from rapp_hop.calls import MountJob, ServiceJob, note
 from rapp_hop.connection import Message
@@ -109,8 +110,7 @@ class HopServer:
         self._running: set[Message] = set()
         self._streams: dict[PatientStream | PatientTlsStream, str] = {}
         self._of_address: Counter[str] = Counter()
-        self._stop_listening: list[Callable[[], None]] = []
-        self._sockets: list[socket.socket] = []
+        self._doors: list[Door] = []
         self._sweeping = self._loop.create_task(self._sweep())
         self._warming: asyncio.Task[None] | None = None
 
@@ -140,18 +140,14 @@ class HopServer:
 
     def listen_on(self, listening: socket.socket, tls: ssl.SSLContext | None = None) -> None:
         """Serve on a socket that listens already; processes that share it share its callers."""
-        listening.setblocking(False)
-        self._sockets.append(listening)
-        self._stop_listening.append(add_accept_handler(listening, functools.partial(self._accept, tls)))
+        self._doors.append(Door(listening, functools.partial(self._accept, tls)))
         if self._warming is None:
             self._warming = self._loop.create_task(self.runner.warm(self.registry))
 
     async def close(self) -> None:
         """Take no new connections, give running calls a moment, end."""
-        for stop in self._stop_listening:
-            stop()
-        for listening in self._sockets:
-            listening.close()
+        for door in self._doors:
+            door.close()
         end = self._loop.time() + self.limits.drain
         while self._running and self._loop.time() < end:
             await asyncio.sleep(0.02)
