@@ -134,6 +134,14 @@ def test_rests_without_motors_and_stands_up_again(driver, motion):
     assert not motion.standing()
 
 
+def test_a_robot_without_motors_is_known_to_sit(driver, motion):
+    assert finish(motion.take_posture("Sit", 1.0))
+    assert motion.nearest_posture() == "Sit"
+    assert finish(motion.relax())
+    driver.wait(0.5)
+    assert motion.nearest_posture() == "Sit"
+
+
 def test_names_its_postures_joints_and_their_limits(motion):
     assert {"StandInit", "Crouch", "Sit"} <= set(motion.postures())
     limits = motion.limits()

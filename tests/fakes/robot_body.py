@@ -144,6 +144,9 @@ class FakeMotion:
     def posture(self) -> str:
         return self.at
 
+    def nearest_posture(self) -> str:
+        return self.at
+
     def limits(self) -> Mapping[str, JointLimits]:
         return LIMITS
 

@@ -86,6 +86,7 @@ message.linear.x = 0.1
 for _ in range(40):
     wheels.publish(message)
     self.pause(0.05)"""
+RISES = "from rapp_api import navigation\nnavigation.take_predefined_posture('StandInit', 1.0)"
 REFUSED = "It has failed"  # so says the robot when the RApp may not even publish
 
 took: dict[str, tuple[float, float]] = {}
@@ -98,6 +99,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WholeRobot]:
     for name, kind in KINDS.items():
         install_rapp(robot.home, name, BODY.format(call=kind.call), keywords=(name.replace("_", " "),), permissions=PERMISSIONS)
     install_rapp(robot.home, "wheels", PUBLISHES, permissions=PERMISSIONS)
+    install_rapp(robot.home, "riser", RISES, permissions=PERMISSIONS)
     with whole_robot(robot, "roscore", "nao_sim", "core_agent"):
         yield robot
     print(f"\n{'who, and what it did':40}{'s until still':>15}{'bound':>8}")
@@ -215,6 +217,18 @@ def test_r03_a_rapp_that_publishes_velocities_past_the_core_agent_moves_nothing(
         robot.until_listening(robot.seen.index(robot.until(lambda seen: seen.state == "s10", since)))
     assert set(robot.said(since)) <= {REFUSED}
     assert max(walked(watch.moments[0], moment) for moment in watch.moments) < KINDS["move_vel"].noise
+
+
+def test_a_robot_that_was_found_sitting_sits_again_without_motors(robot: WholeRobot) -> None:
+    since = len(robot.seen)
+    robot.naoqi.call("ALMotion", "wakeUp", timeout=PATIENCE)
+    assert robot.naoqi.call("ALRobotPosture", "goToPosture", "Sit", 1.0, timeout=PATIENCE)
+    robot.naoqi.call("ALMotion", "rest", timeout=PATIENCE)
+    robot.ask("riser")
+    robot.until(lambda seen: seen.detail == "ALRobotPosture->core reply goToPosture", since)
+    robot.until_listening(robot.seen.index(robot.until(lambda seen: seen.state == "s10", since)))
+    until_resting(robot)
+    assert robot.naoqi.call("ALRobotPosture", "getPostureFamily") == "Sitting"  # its arms sink without motors
 
 
 def test_a_rapp_that_stands_still_in_a_walk_is_stopped(robot: WholeRobot) -> None:

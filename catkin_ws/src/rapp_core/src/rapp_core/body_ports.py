@@ -107,6 +107,9 @@ class Motion(Protocol):
     def posture(self) -> str:
         """The posture the robot is in, or "Unknown"."""
 
+    def nearest_posture(self) -> str:
+        """The posture the robot is in, or the one of its family when limbs without motors have sunk; else "Unknown"."""
+
     def limits(self) -> Mapping[str, JointLimits]:
         """Every joint, and its limits."""
 

@@ -63,7 +63,7 @@ def motion(
 
     def enter(share: Subsystem) -> None:
         if not context.call.puts_back:
-            context.calls.note_before(context.robot.motion.posture)
+            context.calls.note_before(context.robot.motion.nearest_posture)
         movement = begin(share)
         share.memory.update(movement=movement, wait=movement.wait, undo=lambda: cancel(movement), arrived=False)
         share.memory["late"] = context.now() + context.config.motion_time

@@ -48,7 +48,7 @@ def comes_back(context: Context, before: str) -> bool:
     A posture on straight legs needs motors, and a robot that has fallen is not made to get up unasked. Raises CoreError.
     """
     robot = context.robot
-    return before in RESTING and before != robot.motion.posture() and not robot.feeling.senses().fallen
+    return before in RESTING and before != robot.motion.nearest_posture() and not robot.feeling.senses().fallen
 
 
 def rest_machine(context: Context) -> Machine:

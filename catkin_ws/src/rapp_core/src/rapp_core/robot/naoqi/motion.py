@@ -14,6 +14,8 @@ from rapp_core.robot.naoqi.movement import NaoqiMovement, Walking
 FADE = 0.5  # s in which the motors are switched off
 ROBOT_SPACE = 2
 STANDING = "Standing"  # NAOqi's family of postures on straight or bent legs
+FAMILIES = {"Sitting": "Sit", "LyingBelly": "LyingBelly", "LyingBack": "LyingBack"}
+"""Of NAOqi's families those in which a robot can be without motors, and a posture of each."""
 NAMES = (
     "a joint, a chain (Head, LArm, RArm, LLeg, RLeg), Torso, or a sensor (CameraTop, CameraBottom, MicroFront, Accelerometer, ...)"
 )
@@ -105,6 +107,13 @@ class NaoqiMotion:
     def posture(self) -> str:
         """See `body_ports.Motion`."""
         return str(self._connection.call("ALRobotPosture", "getPosture"))
+
+    def nearest_posture(self) -> str:
+        """See `body_ports.Motion`."""
+        name = self.posture()
+        if name != "Unknown":
+            return name
+        return FAMILIES.get(str(self._connection.call("ALRobotPosture", "getPostureFamily")), name)
 
     def limits(self) -> Mapping[str, JointLimits]:
         """See `body_ports.Motion`; asked once: a robot keeps its joints."""
