@@ -67,10 +67,10 @@ class Offers:
         """Offer a service; one of the same name is replaced, its waiting callers are told so. Raises BridgeError."""
         offered = Offered(client, wish.service, service_class(wish.type))
         name = rospy.resolve_name(wish.service)
-        if name not in self._offered and get_service_manager().get_service(name) is not None:
-            raise Refused(f"cannot advertise {wish.service}: it is the bridge's own; choose another name")
         async with self._change:
             await self._withdraw(name, None)
+            if get_service_manager().get_service(name) is not None:
+                raise Refused(f"cannot advertise {wish.service}: it is the bridge's own; choose another name")
             self._offered[name] = offered
             try:
                 offered.service = await self._blocking.run(registered, rospy.Service, name, offered.cls, _unused)

@@ -124,3 +124,16 @@ def test_answers_of_others_are_refused(clients: Clients, peer: Peer) -> None:
             assert "nobody waits" in (await provider.receive("status"))["msg"]
 
     asyncio.run(story())
+
+
+def test_a_service_may_be_offered_while_its_last_provider_is_leaving(clients: Clients, peer: Peer) -> None:
+    async def story() -> None:
+        async with clients:
+            for turn in range(10):
+                provider = await offer(clients, "/handed_on")
+                peer.call("/handed_on", f"turn {turn}")
+                await reply(provider, await provider.receive("call_service"), f"answer {turn}")
+                assert await peer.heard() == f"answer {turn}"
+                provider.leave()
+
+    asyncio.run(story())
