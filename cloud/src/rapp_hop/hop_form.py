@@ -20,7 +20,7 @@ from rapp_hop.service import Service
 
 _FIELDS = 64
 _OWN = OwnForm()
-_MARKS = ("hop-serialize", "hop-client", "hop-responsetype", "hopjs-arguments", "hop-arguments")
+_MARKS = frozenset({"hop-serialize", "hop-client", "hop-responsetype", "hopjs-arguments", "hop-arguments"})
 
 
 class HopForm:
@@ -58,7 +58,7 @@ class HopForm:
 
 def is_hop(headers: Mapping[str, str], query: str) -> bool:
     """Tell whether a request bears the marks of a Hop client."""
-    return any(mark in headers for mark in _MARKS) or "hop-encoding=" in query or "hop-serialize=" in query
+    return not _MARKS.isdisjoint(headers) or "hop-encoding=" in query or "hop-serialize=" in query
 
 
 def _from_query(request: WireRequest, service: Service) -> Call:

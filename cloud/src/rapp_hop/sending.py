@@ -91,20 +91,33 @@ def head_of(answer: WireAnswer, keep: bool, length: int | None, version: str = "
     :param length: of the body; None when it goes in chunks, below zero when the connection's end ends it
     :raises ValueError: when a header holds a line end
     """
-    lines = [f"HTTP/1.1 {answer.status} {_REASONS.get(answer.status, 'Error')}", f"Content-Type: {answer.content_type}"]
-    lines += [f"{name}: {value}" for name, value in answer.headers]
+    if not answer.headers and length is not None and length >= 0:
+        start = _plain_head(answer.status, answer.content_type, keep, version)
+        return start + b"Content-Length: %d\r\nDate: %b\r\n\r\n" % (length, _date(int(time.time())))
+    lines = [f"{name}: {value}" for name, value in answer.headers]
     if length is None:
         lines.append("Transfer-Encoding: chunked")
     elif length >= 0:
         lines.append(f"Content-Length: {length}")
+    start = _plain_head(answer.status, answer.content_type, keep, version)
+    return start + _encoded(lines) + b"Date: %b\r\n\r\n" % _date(int(time.time()))
+
+
+@functools.lru_cache(maxsize=256)
+def _plain_head(status: int, content_type: str, keep: bool, version: str) -> bytes:
+    lines = [f"HTTP/1.1 {status} {_REASONS.get(status, 'Error')}", f"Content-Type: {content_type}"]
     if not keep:
         lines.append("Connection: close")
     elif version == "1.0":
         lines.append("Connection: keep-alive")
-    text = "\r\n".join(lines)
-    if text.count("\n") != len(lines) - 1 or text.count("\r") != len(lines) - 1:
+    return _encoded(lines) + _FIXED
+
+
+def _encoded(lines: list[str]) -> bytes:
+    text = "".join(f"{line}\r\n" for line in lines)
+    if text.count("\n") != len(lines) or text.count("\r") != len(lines):
         raise ValueError("cannot send a header that holds a line end")
-    return text.encode("latin-1", "replace") + b"\r\nDate: " + _date(int(time.time())) + b"\r\n" + _FIXED + b"\r\n"
+    return text.encode("latin-1", "replace")
 
 
 @functools.lru_cache(maxsize=2)

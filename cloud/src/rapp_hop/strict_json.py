@@ -24,14 +24,16 @@ def loads(data: bytes | str, *, limit: int, depth: int = MAX_DEPTH) -> Any:
         raise Invalid(f"cannot read JSON of {len(data)} bytes: at most {limit} are allowed")
     try:
         text = data if isinstance(data, str) else data.decode("utf-8")
-        value = json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant, parse_float=_finite)
+        value = _DECODER.decode(text)
     except UnicodeDecodeError:
         raise Invalid("cannot read JSON: it is not UTF-8, send it as UTF-8") from None
     except RecursionError:
         raise Invalid(f"cannot read JSON: nested deeper than {depth}") from None
     except ValueError as error:
         raise Invalid(f"cannot read JSON: {error}") from None
-    _check(value, depth)
+    # Text that came as UTF-8 has half characters only where it spells them, and depth needs brackets.
+    if isinstance(data, str) or "\\u" in text or text.count("[") + text.count("{") > depth:
+        _check(value, depth)
     return value
 
 
@@ -84,3 +86,6 @@ def _check_text(text: str) -> None:
         text.encode("utf-8")
     except UnicodeEncodeError:
         raise Invalid("cannot read JSON: a text holds half a character (lone surrogate)") from None
+
+
+_DECODER = json.JSONDecoder(object_pairs_hook=_unique, parse_constant=_no_constant, parse_float=_finite)
