@@ -20,6 +20,7 @@ from rapp_cloud.keys import PASSPHRASE, passphrase_from
 from rapp_cloud.memory import open_memory
 from rapp_cloud.profiles import Profile, Profiles
 from rapp_cloud.tls import CERTIFICATE, make_certificate
+from rapp_cloud.witness import noting_offers
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
 from rapp_hop.hz.text import check_name
@@ -90,7 +91,7 @@ def _init(words: list[str]) -> int:
     if not token_file.exists():
         token_file.parent.mkdir(exist_ok=True, mode=0o700)
         with open_memory(data, load_config(data, {}, os.environ).database) as memory:
-            write_whole(token_file, memory.accounts.add(robot).encode(), mode=0o600)
+            write_whole(token_file, memory.accounts.add_robot(robot).encode(), mode=0o600)
     if not (data / "profiles" / f"{robot}.json").exists():
         Profiles(data / "profiles").put(robot, Profile(robot, "en", ()))
     given = [token_file, data / "root.json"]
@@ -106,9 +107,11 @@ def _publish(words: list[str]) -> int:
     parser.add_argument("--data", type=Path, required=True, metavar="DIR")
     parser.add_argument("sources", nargs="+", type=Path, metavar="FOLDER")
     options = parser.parse_args(words)
-    for folder in options.sources:
-        manifest = open_shelf(options.data, passphrase_from(os.environ)).publish(build(folder))
-        print(f"on offer: {manifest.name} {manifest.version}")
+    shelf = open_shelf(options.data, passphrase_from(os.environ))
+    with noting_offers(options.data, shelf, load_config(options.data, {}, os.environ).database):
+        for folder in options.sources:
+            manifest = shelf.publish(build(folder))
+            print(f"on offer: {manifest.name} {manifest.version}")
     return 0
 
 

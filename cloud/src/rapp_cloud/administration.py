@@ -1,13 +1,19 @@
-"""The commands of who runs a platform: `backup`, `restore`. Each works beside a platform that serves."""
+"""The commands of who runs a platform: back-ups, accounts, tokens, audit log. Each works beside a platform that serves."""
 
 import argparse
+import getpass
+import json
 import os
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
 from rapp_cloud.backup import back_up, restore
 from rapp_cloud.config import load_config
+from rapp_cloud.memory import Memory, open_memory
+from rapp_hop.errors import Refused
 
 
 def _parser(command: str, description: str) -> argparse.ArgumentParser:
@@ -38,5 +44,101 @@ def _restore(words: list[str]) -> int:
     return 0
 
 
-COMMANDS: Mapping[str, Callable[[list[str]], int]] = {"backup": _backup, "restore": _restore}
+def _invite(words: list[str]) -> int:
+    parser = _parser("invite", "Print a code by which a robot may come in, once.")
+    parser.add_argument("robot", metavar="ROBOT")
+    parser.add_argument("--hours", type=float, default=24.0, help="that the code is good (%(default)g)")
+    options = parser.parse_args(words)
+    root = options.data / "root.json"
+    if not root.exists():
+        raise Refused(f"cannot find {root}: run rapp_cloud init first")
+    with _memory(options) as memory:
+        print(memory.admission.invite(options.robot, options.hours * 3600, root.read_bytes()))
+        memory.audit.add(_who(), "invite", options.robot)
+    return 0
+
+
+def _account(words: list[str]) -> int:
+    parser = _parser("account", "Make a person's account, or give it another password, which is read from the terminal or stdin.")
+    parser.add_argument("name", metavar="NAME")
+    parser.add_argument("--role", choices=("user", "publisher"), default="user")
+    options = parser.parse_args(words)
+    password = getpass.getpass() if sys.stdin.isatty() else sys.stdin.readline().rstrip("\n")
+    with _memory(options) as memory:
+        memory.admission.enrol(options.name, options.role, password)
+        memory.audit.add(_who(), "account", options.name, role=options.role)
+    print(f"{options.name} is a {options.role}")
+    return 0
+
+
+def _token(words: list[str]) -> int:
+    parser = _parser("token", "Make a token and write it into a file.")
+    parser.add_argument("name", metavar="NAME", help="whose")
+    parser.add_argument("file", type=Path, metavar="FILE", help="to write it to; must not be there")
+    parser.add_argument("--scope", action="append", default=[], help="what it allows (all that its holder may); may be repeated")
+    parser.add_argument("--days", type=float, help="that it is good (until it is revoked)")
+    parser.add_argument("--rate", type=float, help="calls per second (the platform's)")
+    parser.add_argument("--quota", type=int, help="calls per day (any number)")
+    options = parser.parse_args(words)
+    life = options.days * 86400 if options.days else None
+    with _memory(options) as memory:
+        handle = os.open(options.file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        with os.fdopen(handle, "w") as file:
+            file.write(memory.accounts.give(options.name, options.scope, life, rate=options.rate, quota=options.quota))
+        memory.audit.add(_who(), "token", options.name, scopes=options.scope)
+    print(f"{options.file} has a token of {options.name}")
+    return 0
+
+
+def _tokens(words: list[str]) -> int:
+    options = _parser("tokens", "List the tokens: id, whose, what they allow, until when.").parse_args(words)
+    with _memory(options) as memory:
+        for one in memory.accounts.list():
+            until = f"until {datetime.fromtimestamp(one.expires, UTC):%F %R}" if one.expires else ""
+            print(f"{one.token:<14} {one.name:<24} {' '.join(sorted(one.scopes)):<14} {until}".rstrip())
+    return 0
+
+
+def _revoke(words: list[str]) -> int:
+    parser = _parser("revoke", "Take back a token by its id, or all tokens of an account.")
+    parser.add_argument("which", metavar="ID|NAME")
+    options = parser.parse_args(words)
+    with _memory(options) as memory:
+        count = memory.accounts.revoke(options.which)
+        memory.audit.add(_who(), "revoke", options.which, count=count)
+    print(f"{count} revoked")
+    return 0 if count else 1
+
+
+def _audit(words: list[str]) -> int:
+    parser = _parser("audit", "Show the audit log; with --check, look whether it was changed.")
+    parser.add_argument("--last", type=int, default=100, metavar="N", help="entries (%(default)s)")
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--seal", default="", help="that must be in it, such as the last of the platform's log")
+    options = parser.parse_args(words)
+    with _memory(options) as memory:
+        if options.check or options.seal:
+            print(f"{memory.audit.check(options.seal)} entries, all as they were written")
+            return 0
+        for entry in memory.audit.entries(options.last):
+            at = datetime.fromtimestamp(entry.at, UTC)
+            print(f"{entry.number:>6} {at:%F %T} {entry.who:<20} {entry.deed:<10} {entry.subject} {json.dumps(entry.detail)}")
+    return 0
+
+
+@contextmanager
+def _memory(options: argparse.Namespace) -> Iterator[Memory]:
+    with open_memory(options.data, _database(options.data)) as memory:
+        yield memory
+
+
+def _who() -> str:
+    """Who gives the command."""
+    return f"{getpass.getuser()} at the platform"
+
+
+COMMANDS: Mapping[str, Callable[[list[str]], int]] = {
+    "backup": _backup, "restore": _restore, "invite": _invite, "account": _account, "token": _token, "tokens": _tokens,
+    "revoke": _revoke, "audit": _audit,
+}  # fmt: skip
 """By the word after `python -m rapp_cloud`."""

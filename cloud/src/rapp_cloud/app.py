@@ -14,6 +14,7 @@ from rapp_cloud.cloud_agents.doors import Doors
 from rapp_cloud.cloud_agents.engine import LocalProcesses
 from rapp_cloud.cloud_agents.packages import Packages
 from rapp_cloud.config import CloudConfig
+from rapp_cloud.entrance import entrance
 from rapp_cloud.health import checks_of, expiry, health
 from rapp_cloud.interpreter.port import Commands, Interpretation, Interpreter
 from rapp_cloud.keys import Passphrase
@@ -31,7 +32,9 @@ from rapp_cloud.shelf import Shelf
 from rapp_cloud.static import store_files
 from rapp_cloud.store_page import store_page
 from rapp_cloud.tls import server_tls
+from rapp_cloud.turnstile import Turnstile
 from rapp_cloud.weblets import weblets
+from rapp_cloud.witness import note_offers, noted
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
 from rapp_hop.registry import ServiceRegistry
@@ -59,26 +62,30 @@ async def running_cloud(config: CloudConfig) -> AsyncIterator[int]:
     :raises HopError: when the store, a source to publish or the port is not as it must be
     """
     shelf = open_shelf(config.data, Passphrase(config.passphrase, config.passphrase_file))
-    await asyncio.to_thread(_prepare, shelf, config)
+    await asyncio.to_thread(shelf.refresh)
     robots = Robots(time.monotonic, config.lease)
-    async with remembering(config.data, config.database, robots) as memory, _serving(config, shelf, robots, memory) as port:
-        yield port
+    async with remembering(config.data, config.database, robots) as memory:
+        await asyncio.to_thread(_prepare, shelf, config, memory)
+        async with _serving(config, shelf, robots, memory) as port:
+            yield port
 
 
 @asynccontextmanager
 async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Memory) -> AsyncIterator[int]:
     workers = Workers(load_interpreter, config.workers)
-    doors = Doors(config.data / "agents", config.data / "uploads", memory.accounts.robot_of)
+    doors = Doors(config.data / "agents", config.data / "uploads", memory.accounts.name_of)
     agents = _cloud_agents(config, shelf, robots, doors)
     tls_files = config.tls_files
     tls = server_tls(*tls_files) if tls_files else None
     metrics = _metrics(robots, agents, tls_files)
     checks = checks_of(memory, config.data, shelf.metadata / "timestamp.json", tls_files[0] if tls_files else None)
     registry = _registry(config, shelf, workers, robots, agents, memory)
-    server = MeasuredServer(metrics, registry, doors.caller, config.data / "uploads", [
-        *health(checks, metrics, memory.accounts.robot_of),
+    admit = Turnstile(memory.accounts, time.monotonic).admit
+    server = MeasuredServer(metrics, admit, registry, doors.caller, config.data / "uploads", [
+        *entrance(memory.admission, memory.audit),
+        *health(checks, metrics, memory.accounts.name_of),
         store_files("/tuf/metadata/", shelf.metadata),
-        store_files("/tuf/targets/", shelf.targets),
+        noted(store_files("/tuf/targets/", shelf.targets), memory),
         weblets(shelf, "https" if tls else "http"),
         store_page(shelf),
         agent_calls(agents),
@@ -98,12 +105,13 @@ async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Me
         doors.close()
 
 
-def _prepare(shelf: Shelf, config: CloudConfig) -> None:
+def _prepare(shelf: Shelf, config: CloudConfig, memory: Memory) -> None:
     shutil.rmtree(config.data / "uploads", ignore_errors=True)  # of calls that a crash cut short
-    shelf.refresh()
+    before = shelf.offers()
     for folder in config.publish:
         manifest = shelf.publish(build(folder))
         _log.info("on offer: %s %s", manifest.name, manifest.version)
+    note_offers(memory.audit, before, shelf.offers())
 
 
 def _cloud_agents(config: CloudConfig, shelf: Shelf, robots: Robots, doors: Doors) -> CloudAgents:
@@ -130,7 +138,7 @@ def _registry(
         [
             *presence_services(robots, shelf),
             *people_services(Profiles(config.data / "profiles")),
-            *run_services(memory.reports),
+            *run_services(memory.reports, memory.audit),
             *voice_services(robots, shelf, run),
             *agent_services(agents, robots),
             *sight_services(),

@@ -12,7 +12,9 @@ import json
 import logging
 import os
 import secrets
+import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,25 +56,49 @@ class Audit:
         self._database = database
         self._path = folder / KEY
         self._clock = clock
+        self._waiting: deque[dict[str, Any]] = deque()
+        self._writing = threading.Lock()
 
     def add(self, who: str, deed: str, subject: str = "", **detail: Any) -> None:
         """Note that somebody did something.
 
         :raises HopError: see `Database.writing`; nothing is noted then
         """
-        key = self._key()
+        self.note(who, deed, subject, **detail)
+        self.write()
+
+    def note(self, who: str, deed: str, subject: str = "", **detail: Any) -> None:
+        """Remember that somebody did something, for the next `write`; blocks nobody."""
         text = json.dumps(detail, sort_keys=True)[:_MOST]
+        row = {"at": round(self._clock(), 3), "who": who[:100], "deed": deed[:100], "subject": subject[:200], "detail": text}
+        self._waiting.append(row)
+
+    def write(self) -> None:
+        """Write what was noted.
+
+        :raises HopError: see `Database.writing`; it is written the next time then
+        """
+        with self._writing:
+            rows = list(self._waiting)
+            if rows:
+                self._append(rows)
+            for _ in rows:
+                self._waiting.popleft()
+
+    def _append(self, rows: list[dict[str, Any]]) -> None:
+        key = self._key()
         with self._database.writing() as connection:
             if self._database.server:
                 connection.execute(sa.text(f"SELECT pg_advisory_xact_lock({_LOCK})"))
             last = connection.execute(sa.select(audit.c.number, audit.c.seal).order_by(audit.c.number.desc()).limit(1)).first()
-            row = {
-                "number": (last.number if last else 0) + 1, "at": round(self._clock(), 3), "who": who[:100], "deed": deed[:100],
-                "subject": subject[:200], "detail": text,
-            }  # fmt: skip
-            row["seal"] = _seal(key, last.seal if last else "", row)
-            connection.execute(sa.insert(audit).values(row))
-        _log.info("%s %s %s; audit %d %s", who, deed, subject, row["number"], row["seal"])
+            number, seal = (last.number, last.seal) if last else (0, "")
+            for row in rows:
+                number += 1
+                seal = _seal(key, seal, {**row, "number": number})
+                connection.execute(sa.insert(audit).values(row | {"number": number, "seal": seal}))
+        for row in rows:
+            _log.info("%s %s %s", row["who"], row["deed"], row["subject"])
+        _log.info("audit log: %d entries, seal %s", number, seal)
 
     def entries(self, last: int = 100) -> list[Entry]:
         """Return the newest entries, oldest first."""

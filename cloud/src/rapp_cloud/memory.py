@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 
 from rapp_cloud.accounts import Accounts
+from rapp_cloud.admission import Admission
 from rapp_cloud.audit import Audit
 from rapp_cloud.database.engine import FILE, Database
 from rapp_cloud.registrations import Registrations
@@ -25,6 +26,7 @@ class Memory:
     def __init__(self, database: Database, folder: Path) -> None:
         self.database = database
         self.accounts = Accounts(database)
+        self.admission = Admission(self.accounts)
         self.audit = Audit(database, folder)
         self.reports = Reports(database)
 
@@ -87,6 +89,7 @@ async def _keep_in_step(memory: Memory, registrations: Registrations, stop: asyn
         try:
             await asyncio.to_thread(memory.accounts.refresh)
             await asyncio.to_thread(registrations.write)
+            await asyncio.to_thread(memory.audit.write)
             well = True
         except HopError as error:
             if well:  # said once, not at every step

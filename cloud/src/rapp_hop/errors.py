@@ -7,11 +7,13 @@ class HopError(Exception):
     """Root of all errors of this package.
 
     `kind` is the wire word; `status` the HTTP status it came with, when there was one; `reason` a word for programs that
-    says what exactly was wrong, where that makes a difference to who is told.
+    says what exactly was wrong, where that makes a difference to who is told; `retry_after` the seconds in which who was
+    turned away may come again.
     """
 
     kind: ClassVar[str] = "bug"
     reason: str = ""
+    retry_after: int = 1
 
     def __init__(self, message: str, status: int | None = None) -> None:
         super().__init__(message)

@@ -84,7 +84,7 @@ def status_of(error: HopError) -> int:
 
 def headers_of(error: HopError) -> tuple[tuple[str, str], ...]:
     """Return the headers that belong to an error: whoever was turned away before anything ran may safely come again."""
-    return (("Retry-After", "1"),) if error.reason == TURNED_AWAY else ()
+    return (("Retry-After", str(error.retry_after)),) if error.reason == TURNED_AWAY else ()
 
 
 TURNED_AWAY = "turned away"

@@ -49,7 +49,7 @@ def _platform(data: Path, url: str | None, tmp_path: Path) -> str:
     shelf.publish(build(source_folder(tmp_path)))
     Profiles(data / "profiles").put("nao", Profile("Maria", "en", (Contact("Małgorzata", "m@home.example"),)))
     with open_memory(data, url) as memory:
-        token = memory.accounts.add("nao")
+        token = memory.accounts.add_robot("nao")
         memory.reports.keep("nao", {"run": "r-1", "said": "Dzień dobry \x00"})
         memory.audit.add("nao", "install", "hello")
         robots = Robots(lambda: 0.0, lease=1e6)
@@ -79,7 +79,7 @@ def test_what_comes_back_is_what_was_there(database_url: str, other_url: str | N
     restore(again, other_url, file)
     assert _content(again, other_url) == before
     with open_memory(again, other_url) as memory:
-        assert memory.accounts.robot_of(token) == "nao"
+        assert memory.accounts.name_of(token) == "nao"
         assert memory.reports.of("nao") == [{"run": "r-1", "said": "Dzień dobry \x00"}]
         assert memory.audit.check() == 1
         memory.audit.add("nao", "remove", "hello")

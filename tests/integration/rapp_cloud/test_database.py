@@ -70,27 +70,27 @@ def test_what_fails_half_way_changes_nothing(database: Database) -> None:
 def test_tokens_name_robots_and_are_not_kept(database: Database) -> None:
     accounts = Accounts(database)
     accounts.refresh()
-    assert accounts.robot_of("x" * 32) is None
-    one, two = accounts.add("nao"), accounts.add("other")
-    assert (accounts.robot_of(one), accounts.robot_of(two)) == ("nao", "other")
+    assert accounts.name_of("x" * 32) is None
+    one, two = accounts.add_robot("nao"), accounts.add_robot("other")
+    assert (accounts.name_of(one), accounts.name_of(two)) == ("nao", "other")
     with database.reading() as connection:
         assert one not in str(connection.execute(sa.select(tables.tokens)).all())
 
 
 def test_h14_wrong_tokens(database: Database) -> None:
     accounts = Accounts(database)
-    token = accounts.add("nao")
+    token = accounts.add_robot("nao")
     for wrong in (None, "", token[:-1], token + "x", token.swapcase(), "é" * 20, "\udcff" * 20, "x" * 10_000, f" {token}"):
-        assert accounts.robot_of(wrong) is None
+        assert accounts.name_of(wrong) is None
 
 
 def test_another_process_s_token_is_seen(database: Database) -> None:
     here, there = Accounts(database), Accounts(database)
     here.refresh()
-    token = there.add("nao")
-    assert here.robot_of(token) is None
+    token = there.add_robot("nao")
+    assert here.name_of(token) is None
     here.refresh()
-    assert here.robot_of(token) == "nao"
+    assert here.name_of(token) == "nao"
 
 
 def test_the_token_file_of_an_older_platform_is_taken_over(database: Database, tmp_path: Path) -> None:
@@ -98,7 +98,8 @@ def test_the_token_file_of_an_older_platform_is_taken_over(database: Database, t
     path.write_text(json.dumps({"x" * 32: "nao"}))
     accounts = Accounts(database)
     accounts.adopt(path)
-    assert accounts.robot_of("x" * 32) == "nao"
+    accounts.refresh()
+    assert accounts.name_of("x" * 32) == "nao"
     assert not path.exists()
     accounts.adopt(path)
 

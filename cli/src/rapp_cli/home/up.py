@@ -21,7 +21,10 @@ from rapp_cli.home.ports import USUAL, choose, is_served
 from rapp_cli.home.supervisor import Process, Supervisor
 from rapp_cli.timeline import follow
 from rapp_cloud.app import open_shelf
+from rapp_cloud.config import load_config
 from rapp_cloud.keys import passphrase_from
+from rapp_cloud.shelf import Shelf
+from rapp_cloud.witness import noting_offers
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
 
@@ -97,14 +100,16 @@ def _prepare(home: Home, settings: Settings) -> None:
         if not profile.exists():
             write_profile(profile, {**RECIPIENT, **CONTACTS})
         make_platform(home.cloud, settings.name)
-        for folder in own_rapps():
-            _offer(home, folder)
+        shelf = open_shelf(home.cloud, passphrase_from(os.environ))
+        with noting_offers(home.cloud, shelf, load_config(home.cloud, {}, os.environ).database):
+            for folder in own_rapps():
+                _offer(shelf, folder)
     home.keep(settings)
 
 
-def _offer(home: Home, folder: Path) -> None:
+def _offer(shelf: Shelf, folder: Path) -> None:
     try:
-        open_shelf(home.cloud, passphrase_from(os.environ)).publish(build(folder))
+        shelf.publish(build(folder))
     except (HopError, OSError) as error:
         print(f"rapp up: the store keeps what it has of {folder.name}: {error}", flush=True)
 

@@ -3,7 +3,7 @@
 import argparse
 
 from rapp_cli.errors import UsageError
-from rapp_cli.store.place import add_store_options, store_of, told
+from rapp_cli.store.place import add_store_options, noting, store_of, told
 from rapp_cloud.shelf import Offer, Shelf
 
 
@@ -66,6 +66,7 @@ def _about(offer: Offer) -> list[str]:
 
 
 def _yank(shelf: Shelf, options: argparse.Namespace) -> int:
-    shelf.yank(options.name, options.version)
+    with noting(options, shelf):
+        shelf.yank(options.name, options.version)
     print(f"{options.name} {options.version} is off offer")
     return 0

@@ -3,14 +3,17 @@
 import argparse
 import functools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rapp_cli.errors import CommandError, UsageError
 from rapp_cli.home.place import add_home_option, home_of
 from rapp_cloud.app import open_shelf
+from rapp_cloud.config import load_config
 from rapp_cloud.keys import KeyRing, passphrase_from
 from rapp_cloud.shelf import Shelf
+from rapp_cloud.witness import noting_offers
 from rapp_hop.errors import HopError, Invalid
 
 Run = Callable[[argparse.Namespace], int]
@@ -29,6 +32,14 @@ def store_of(options: argparse.Namespace) -> Shelf:
     if not shelf.root_file.exists():
         raise UsageError(f"cannot find a store in {data}: ./rapp up makes one, or name its folder with --data")
     return shelf
+
+
+@contextmanager
+def noting(options: argparse.Namespace, shelf: Shelf) -> Iterator[None]:
+    """Have the platform's audit log note what the block changes of its offers."""
+    data = _data(options)
+    with noting_offers(data, shelf, load_config(data, {}, os.environ).database):
+        yield
 
 
 def keys_of(options: argparse.Namespace) -> KeyRing:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rapp_cli.errors import UsageError
 from rapp_cli.store.permissions import missing_permissions
-from rapp_cli.store.place import add_store_options, store_of, told
+from rapp_cli.store.place import add_store_options, noting, store_of, told
 from rapp_cloud.publishing import check_publication
 from rapp_hop.hz.archive import build, inspect
 
@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
             check_publication(manifest, [offer.manifest for offer in shelf.offers()])
             print(f"can be published: {manifest.name} {manifest.version}")
             continue
-        shelf.publish(package, options.publisher, tuple(options.only), check_publication)
+        with noting(options, shelf):
+            shelf.publish(package, options.publisher, tuple(options.only), check_publication)
         print(f"on offer: {manifest.name} {manifest.version}, {len(package)} bytes")
     return 0
 

@@ -7,14 +7,39 @@ HASH = String(64)  # SHA-256, hexadecimal
 
 metadata = MetaData()
 
+accounts = Table(
+    "accounts",
+    metadata,
+    Column("name", NAME, primary_key=True),
+    Column("role", String(16), nullable=False),
+    Column("password", Text),
+    Column("created", Double, nullable=False),
+)
+"""Users, publishers and robots; the password as Argon2 hash, robots have none."""
+
 tokens = Table(
     "tokens",
     metadata,
     Column("hash", HASH, primary_key=True),
-    Column("robot", NAME, nullable=False),
+    Column("name", NAME, nullable=False),
     Column("created", Double, nullable=False),
+    Column("scopes", Text, nullable=False),
+    Column("expires", Double),
+    Column("revoked", Double),
+    Column("rate", Double),
+    Column("quota", Integer),
 )
-"""Who may call. Only the hash of a token is kept."""
+"""Who may call, what (scopes, blank between), until when, how many calls in a second and in a day. Only hashes are kept."""
+
+codes = Table(
+    "codes",
+    metadata,
+    Column("hash", HASH, primary_key=True),
+    Column("robot", NAME, nullable=False),
+    Column("expires", Double, nullable=False),
+    Column("used", Double),
+)
+"""One-time codes, by which a robot gets its first token."""
 
 marks = Table("marks", metadata, Column("name", NAME, primary_key=True), Column("value", Integer, nullable=False))
 """Numbers that grow with every change of something, so that other processes see it cheaply."""
