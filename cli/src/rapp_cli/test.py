@@ -1,4 +1,7 @@
-"""`./rapp test`: style, types, layers, then all tests, in the order of their cost."""
+"""`./rapp test`: style, types, layers, then all tests, in the order of their cost.
+
+Files of tests run side by side, but for the system tests: those speak in real time.
+"""
 
 import argparse
 import os
@@ -18,13 +21,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run every check even when an earlier one failed; 0 when all passed, else 1."""
-    tests = [] if not options.fast else ["--ignore=tests/system"]
+    pytest = [sys.executable, "-m", "pytest", "--durations=25", *options.pytest]
     checks = {
         "ruff": [_tool("ruff"), "check", "."],
         "mypy": [_tool("mypy")],
         "import-linter": [_tool("lint-imports")],
-        "pytest": [sys.executable, "-m", "pytest", *tests, *options.pytest],
+        "tests": [*pytest, "-n2", "--dist=loadfile", "tests/unit", "tests/contract", "tests/integration"],
+        "system tests": [*pytest, "tests/system"],
     }
+    if options.fast:
+        del checks["system tests"]
     failed = [name for name, words in checks.items() if not _passes(name, words)]
     if failed:
         print(f"rapp test: failed: {', '.join(failed)}", file=sys.stderr)
