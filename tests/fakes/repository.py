@@ -95,7 +95,7 @@ class Repository:
         path = f"{name}-{version}.hz"
         return f"targets/{self.publishers[publisher].targets[path].hashes['sha256']}.{path}"
 
-    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None) -> None:
+    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None, start: int = 0) -> None:
         path = url.removeprefix(f"{URL}/")
         self.asked.append((path, limit))
         if self.away:
@@ -105,7 +105,7 @@ class Repository:
         data = self.files[path]
         if len(data) > limit:
             raise Invalid(f"cannot accept {url}: it is longer than {limit} bytes")
-        write(data)
+        write(data[start:])
         if on_progress is not None:
             on_progress(len(data), len(data))
 
@@ -127,10 +127,11 @@ class Client:
         self.before: Callable[[str, Writer], Any] | None = None  # awaited before each answer
 
     async def download(
-        self, path: str, destination: Writer, limit: int, timeout: float = 60.0, on_progress: Progress | None = None
-    ) -> int:
+        self, path: str, destination: Writer, limit: int, timeout: float = 60.0, on_progress: Progress | None = None,
+        start: int = 0,
+    ) -> int:  # fmt: skip
         if self.before is not None:
             await self.before(path, destination)
         await asyncio.sleep(0)
-        self._repository.get(path, destination, limit, on_progress)
+        self._repository.get(path, destination, limit, on_progress, start)
         return 0

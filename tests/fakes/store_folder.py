@@ -12,10 +12,10 @@ class StoreFolder:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
-    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None) -> None:
+    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None, start: int = 0) -> None:
         path = self._folder / url.removeprefix("store:/")
         if not path.exists():
             raise Refused("cannot fetch it", 404)
         data = path.read_bytes()
         assert len(data) <= limit
-        write(data)
+        write(data[start:])

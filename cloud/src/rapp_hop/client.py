@@ -21,7 +21,7 @@ from rapp_hop import strict_json
 from rapp_hop.connecting import BY_STATUS, CUT, NOT_SENT, fetch, make_connections, origin
 from rapp_hop.errors import HopError, Invalid, Refused, Unreachable, from_wire
 from rapp_hop.protocol import TURNED_AWAY
-from rapp_hop.streaming import Progress, Sink, Writer
+from rapp_hop.streaming import PARTIAL, Progress, Sink, Writer
 from rapp_hop.uploading import ASK_FIRST, Parcel, pack_json, pack_multipart
 
 MAX_ANSWER = 16 * 2**20  # bytes of one JSON answer
@@ -150,20 +150,22 @@ class HopClient:
         limit: int,
         timeout: float = 60.0,
         on_progress: Progress | None = None,
+        start: int = 0,
     ) -> int:
-        """Stream `path` (a path on this platform, or a whole URL) into a file or a writer; return the bytes written.
+        """Stream `path` (a path on this platform, or a whole URL) into a file or a writer; return its length in bytes.
 
         What was written before an error stays: write aside and rename.
 
         :param limit: bytes; one more is `Invalid`
         :param timeout: seconds for the whole transfer, so a trickling server cannot hold it; silence ends it after `IDLE`
+        :param start: bytes that are here already: only what follows is fetched (HTTP Range) and written
         :raises HopError: `Refused` for 4xx (with `.status`), `Unreachable`, `Invalid`
         """
         url = self._whole(path)
         if isinstance(destination, Path):
-            with destination.open("wb") as file:
-                return await self._stream(url, None, file.write, limit, timeout, on_progress)
-        return await self._stream(url, None, destination, limit, timeout, on_progress)
+            with destination.open("ab" if start else "wb") as file:
+                return await self._stream(url, None, file.write, limit, timeout, on_progress, start)
+        return await self._stream(url, None, destination, limit, timeout, on_progress, start)
 
     async def close(self) -> None:
         """End the calls begun by `with_url` and let go of the connections."""
@@ -200,10 +202,13 @@ class HopClient:
         raise AssertionError("the last attempt returns or raises")
 
     async def _stream(
-        self, url: str, parcel: Parcel | None, write: Writer, limit: int, timeout: float, on_progress: Progress | None
-    ) -> int:
-        sink = Sink(url, write, limit, on_progress)
+        self, url: str, parcel: Parcel | None, write: Writer, limit: int, timeout: float, on_progress: Progress | None,
+        start: int = 0,
+    ) -> int:  # fmt: skip
+        sink = Sink(url, write, limit, on_progress, start)
         request = await self._request(url, parcel)
+        if start:
+            request.headers["Range"] = f"bytes={start}-"
         request.headers["Accept-Encoding"] = "identity"
         request.decompress_response = False
         request.header_callback, request.streaming_callback = sink.header, sink.data
@@ -225,7 +230,7 @@ class HopClient:
             sink.stop()
             client.close()
         sink.check()
-        if response.code != 200:
+        if response.code not in (200, PARTIAL if start else 200):
             _fail(url, response.code, sink.refusal, response.headers.get("Retry-After") is not None)
         return sink.received
 

@@ -11,7 +11,7 @@ import uuid
 from pathlib import Path
 
 from rapp_hop.errors import HopError, Refused
-from rapp_hop.hz.delivery import Delivery
+from rapp_hop.hz.delivery import Delivery, DeliveryLimits
 from rapp_link.agents import CloudAgents
 from rapp_link.cloud_side import Platform
 from rapp_link.commands import Commands, sign_of_life
@@ -48,14 +48,16 @@ class Link:
         outbox = Outbox(own / "outbox", config.mail.waiting)
         self.platform = Platform(self.client, config, reports)
         self.postman = Postman(outbox, TellingSender(SmtpSender(config.mail), self._tell), config.mail)
-        delivery = Delivery(self.client, config.root, config.home) if config.root else None
+        limits = DeliveryLimits(quota=config.quota)
+        self.delivery = Delivery(self.client, config.root, config.home, limits) if config.root else None
         self.agents = CloudAgents(self.platform)
-        commands = Commands(config, self.platform, delivery, outbox, self.postman, reports, self.agents).table()
+        commands = Commands(config, self.platform, self.delivery, outbox, self.postman, reports, self.agents).table()
         self.office = Office(JobTable(config.jobs, config.longest), commands, lambda event: self.ros.tell(event))
         self.ros = RosSide(config.bridge, list(commands), self.office.request, self.office.cancel, self.agents.keep)
 
     async def run(self, stop: asyncio.Event) -> None:
         """Serve until `stop` is set."""
+        await self._tidy()
         self.ros.open()
         try:
             async with asyncio.TaskGroup() as group:
@@ -72,6 +74,14 @@ class Link:
             await self.office.close()
             await self.ros.close()
             await self.client.close()
+
+    async def _tidy(self) -> None:
+        """Remove what an installation has left that was cut off; a disk that refuses is told again at the next one."""
+        try:
+            if self.delivery is not None:
+                await self.delivery.tidy()
+        except HopError as error:
+            _log.warning("%s", error)
 
     def _tell(self, text: str) -> None:
         self.ros.tell(message(text))

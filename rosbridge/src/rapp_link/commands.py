@@ -55,6 +55,7 @@ class Commands:
         self._postman = postman
         self._reports = reports
         self._agents = agents
+        self._gone_back: dict[str, Any] = {}  # the last run that did not start, and what came of it
         self._list = config.home / "link" / "rapps.json"
 
     def table(self) -> Mapping[str, Command]:
@@ -64,6 +65,7 @@ class Commands:
             "list_rapps": self.list_rapps,
             "interpret": self.interpret,
             "install": self.install,
+            "started": self.started,
             "remove": self.remove,
             "start_cloud_agent": self.start_cloud_agent,
             "stop_cloud_agent": self.stop_cloud_agent,
@@ -112,6 +114,20 @@ class Commands:
         done = await self._store().install(name, None, on_phase, self._platform.recipient)
         return {"name": done.name, "version": done.version, "path": str(done.path), "installed": done.new}
 
+    async def started(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
+        """{run, name, version, ok, detail} → {back}: how the first start of a version ended; the version gone back to, or null.
+
+        Going back is reported with the run, at once and in what the core agent reports of it later.
+        """
+        run, name, version, ok, detail = take(arguments, run=str, name=str, version=str, ok=bool, detail=str)
+        before = await self._store().started(name, version, ok)
+        if before is None:
+            return {"back": None}
+        _log.warning("%s %s did not start (%s): %s is back", name, version, detail, before.version)
+        self._gone_back = {"run": run, "rolled_back": {"rapp": name, "from": version, "to": before.version, "why": detail[:500]}}
+        await self.report({"run": {"rapp": name, "version": version, "outcome": "failed", **self._gone_back}}, _ticket)
+        return {"back": before.version}
+
     async def remove(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
         """{name} → {removed}."""
         (name,) = take(arguments, name=str)
@@ -157,6 +173,8 @@ class Commands:
     async def report(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
         """{run} → {kept}; it goes to the platform as soon as that can be reached. False: it has it already."""
         (run,) = take(arguments, run=dict)
+        if self._gone_back and run.get("run") == self._gone_back["run"]:
+            run = {**run, **self._gone_back}
         kept = await in_thread(self._reports.keep, run)
         self._platform.hurry()
         return {"kept": kept}

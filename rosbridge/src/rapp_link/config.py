@@ -44,6 +44,7 @@ class Config:
     cloud_ca_file: Path | None = None  # PEM; none: the system's authorities
     token: str = field(default="", repr=False)
     root: bytes = field(default=b"", repr=False)  # trusted root.json of the store
+    quota: int = 2**30  # bytes of all installed RApps and their downloads; 0: no bound
     mail: MailConfig = field(default_factory=MailConfig)
     jobs: int = 32  # open at once
     longest: float = 600.0  # seconds a job may take
@@ -67,6 +68,7 @@ def read(words: Sequence[str], env: Mapping[str, str] = os.environ) -> Config:
         cloud_ca_file=Path(options.cloud_ca_file) if options.cloud_ca_file else None,
         token=_text(options.token_file, "token file"),
         root=_bytes(options.root_file, "trusted root"),
+        quota=_count(options.quota, "quota", "bytes"),
         mail=_mail(options, env),
     )
 
@@ -85,6 +87,7 @@ def _parser(env: Mapping[str, str]) -> argparse.ArgumentParser:
     option("home", data / "rapp", "the robot's data folder")
     option("token-file", "", "file with the robot's token for the platform")
     option("root-file", "", "trusted root.json of the platform's store")
+    option("quota", Config.quota, "bytes that installed RApps may take of the disk; 0: no bound")
     option("smtp-host", "", "mail server; none: no mails are sent")
     option("smtp-port", MailConfig.port, "its port")
     option("smtp-user", "", "name of the account; none: no login")
@@ -126,6 +129,12 @@ def _mail(options: argparse.Namespace, env: Mapping[str, str]) -> MailConfig:
         ca_file=Path(options.smtp_ca_file) if options.smtp_ca_file else None,
         sender=sender,
     )
+
+
+def _count(text: object, name: str, unit: str) -> int:
+    if not str(text).isdecimal():
+        raise Invalid(f"cannot use --{name} {text!r}: give a number of {unit}")
+    return int(str(text))
 
 
 def _text(path: str, what: str) -> str:

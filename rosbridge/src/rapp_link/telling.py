@@ -55,10 +55,12 @@ class TellingClient(HopClient):
         limit: int,
         timeout: float = 60.0,
         on_progress: Progress | None = None,
+        start: int = 0,
     ) -> int:
         """See `HopClient`."""
         name = _HASH.sub("", urlsplit(path).path.rpartition("/")[2])
-        count: int = await self._told(REPOSITORY, f"GET {name}", super().download(path, destination, limit, timeout, on_progress))
+        work = super().download(path, destination, limit, timeout, on_progress, start)
+        count: int = await self._told(REPOSITORY, f"GET {name}{f' from byte {start}' if start else ''}", work)
         return count
 
     async def _told(self, whom: str, what: str, work: Any) -> Any:

@@ -24,13 +24,14 @@ class FolderClient:
         self._folder = folder
 
     async def download(
-        self, path: str, write: Writer, limit: int, timeout: float = 60.0, on_progress: Progress | None = None
-    ) -> int:
+        self, path: str, write: Writer, limit: int, timeout: float = 60.0, on_progress: Progress | None = None,
+        start: int = 0,
+    ) -> int:  # fmt: skip
         file = self._folder / path.removeprefix(f"{self.base_url}/tuf/")
         if not file.exists():
             raise Refused("cannot fetch it", 404)
         data = file.read_bytes()
-        write(data)
+        write(data[start:])
         return len(data)
 
 

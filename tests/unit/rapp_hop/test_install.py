@@ -19,7 +19,9 @@ from rapp_hop.hz.tar import Limits
 
 
 def package(folder: Path, version: str, name: str = "hello", says: str | None = None) -> PackageFile:
+    folder.mkdir(exist_ok=True)
     path = folder / f"{name}-{version}.hz"
+    shutil.rmtree(folder / "src", ignore_errors=True)
     path.write_bytes(build(source_folder(folder / "src", name, version, f"print({version!r})\n")))
     return PackageFile(path, name, says or version, Limits())
 
@@ -60,15 +62,47 @@ def test_again_is_not_new(rapps: RappFolder, tmp_path: Path) -> None:
     assert not install(source, rapps).new
 
 
-def test_the_version_before_is_kept_older_ones_go_and_back_is_possible(rapps: RappFolder, tmp_path: Path) -> None:
-    for version in ("1.0.0", "1.1.0", "1.2.0"):
+def versions(rapps: RappFolder) -> list[str]:
+    return sorted(path.name for path in (rapps.root / "hello").iterdir() if not path.is_symlink())
+
+
+def test_the_version_before_stays_until_the_new_one_has_started(rapps: RappFolder, tmp_path: Path) -> None:
+    for version in ("1.0.0", "1.1.0"):
         install(package(tmp_path, version), rapps)
-    kept = sorted(path.name for path in (tmp_path / "rapps" / "hello").iterdir() if not path.is_symlink())
-    assert kept == ["1.1.0", "1.2.0"]
-    assert rapps.go_back("hello").version == "1.1.0"
-    assert rapps.find("hello", "1.2.0") is None
+    assert not rapps.settle("hello", "1.0.0")
+    assert versions(rapps) == ["1.0.0", "1.1.0"]
+    assert rapps.settle("hello", "1.1.0")
+    assert versions(rapps) == ["1.1.0"]
+    assert not rapps.settle("hello", "1.1.0")
     with pytest.raises(Refused, match="no version before"):
         rapps.go_back("hello")
+
+
+def test_the_version_gone_back_to_is_the_last_that_has_started(rapps: RappFolder, tmp_path: Path) -> None:
+    for version in ("1.0.0", "1.1.0", "1.2.0"):
+        install(package(tmp_path, version), rapps)
+    assert versions(rapps) == ["1.0.0", "1.2.0"]
+    assert rapps.go_back("hello").version == "1.0.0"
+    assert versions(rapps) == ["1.0.0"]
+    assert rapps.failed("hello") == "1.2.0"
+    with pytest.raises(Refused, match="no version before"):
+        rapps.go_back("hello")
+
+
+def test_a_version_that_failed_may_be_installed_again_on_request(rapps: RappFolder, tmp_path: Path) -> None:
+    for version in ("1.0.0", "1.1.0"):
+        install(package(tmp_path, version), rapps)
+    rapps.go_back("hello")
+    assert install(package(tmp_path / "again", "1.1.0"), rapps).new
+    assert rapps.failed("hello") is None
+    assert rapps.find("hello") == rapps.find("hello", "1.1.0")
+
+
+def test_without_a_version_that_has_started_the_first_one_is_the_one_before(rapps: RappFolder, tmp_path: Path) -> None:
+    for version in ("1.0.0", "1.1.0", "1.0.0"):
+        install(package(tmp_path / version, version), rapps)
+    assert versions(rapps) == ["1.0.0"]
+    assert not rapps.settle("hello", "1.0.0")
 
 
 def test_s17_a_full_disk_leaves_what_was(rapps: RappFolder, tmp_path: Path) -> None:

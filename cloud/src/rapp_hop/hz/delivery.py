@@ -1,23 +1,25 @@
 """From the store onto the robot: list, download, verify, install; asynchronous, for who lives in an asyncio loop.
 
 The verifying half (`trust`) and the disk half (`install`) block, so they run in a thread, and ask the loop's client for
-bytes.
+bytes. Different RApps are installed side by side; who asks for one that is being installed waits for it.
 """
 
 import asyncio
 import concurrent.futures
-import secrets
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Refused, Unreachable
+from rapp_hop.hz.archive import inspect
+from rapp_hop.hz.downloads import Downloads
 from rapp_hop.hz.install import Installed, PackageFile, RappFolder, install
 from rapp_hop.hz.manifest import Manifest, reasons_against
+from rapp_hop.hz.quota import Claim, Quota, unpacked_size
 from rapp_hop.hz.semver import parse_version
 from rapp_hop.hz.tar import Limits
 from rapp_hop.hz.trust import Attack, Release, TrustedStore, Untrusted, Versions, choose
@@ -25,6 +27,7 @@ from rapp_hop.streaming import Progress, Writer
 
 OnPhase = Callable[[str, dict[str, Any]], None]  # "downloading" | "verified" | "installed", and details
 _Tell = Callable[..., None]
+AT_ONCE = 3  # installations
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,7 @@ class DeliveryLimits:
     slowest: float = 1024.0  # bytes per second on average over each `window`; less is slow retrieval
     window: float = 5.0  # seconds
     package: Limits = field(default_factory=Limits)
+    quota: int = 0  # bytes of all RApps and downloads on the disk; 0: no bound
 
 
 @dataclass(frozen=True)
@@ -62,14 +66,18 @@ class Delivery:
         self._home = home
         self._limits = limits or DeliveryLimits()
         self.folder = RappFolder(home / "rapps")
-        self._one = asyncio.Lock()  # what was seen of the store has one writer
+        self._downloads = Downloads(home / "downloads")
+        self._quota = Quota(self._limits.quota, home, self.folder, self._downloads)
+        self._places = asyncio.Semaphore(AT_ONCE)
+        self._busy: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()  # by RApp
 
     async def install(
         self, name: str, version: str | None = None, on_phase: OnPhase | None = None, robot: Recipient | None = None
     ) -> Installed:
         """Install a RApp, the newest version when none is named; one that is there already is not fetched again.
 
-        Cancelling ends the download and waits for the thread, so that nothing half done goes on.
+        The newest version is not taken again when it is the one that was gone back from. A download that breaks off is
+        gone on with by the next one. Cancelling ends the download and waits for the thread, so that nothing half done goes on.
 
         :param on_phase: called in this loop
         :param robot: what cannot run there, or is not for it, is refused
@@ -85,7 +93,7 @@ class Delivery:
             if on_phase is not None:
                 loop.call_soon_threadsafe(on_phase, phase, details)
 
-        async with self._one:
+        async with self._alone(name), self._places:
             work = asyncio.ensure_future(asyncio.to_thread(self._install, transport, _Wish(name, version, robot), tell))
             try:
                 return await asyncio.shield(work)
@@ -97,29 +105,67 @@ class Delivery:
 
     async def remove(self, name: str) -> bool:
         """Remove a RApp; false when it was not there."""
-        return await asyncio.to_thread(self.folder.remove, name)
+        async with self._alone(name):
+            return await asyncio.to_thread(self.folder.remove, name)
+
+    async def started(self, name: str, version: str, ok: bool) -> Installed | None:
+        """Take note how the first start of a version ended: one that started replaces the version before for good.
+
+        :return: the version before, when it is the current one again
+        :raises Refused: when the disk is unwilling
+        """
+        async with self._alone(name):
+            return await asyncio.to_thread(self._started, name, version, ok)
+
+    async def tidy(self) -> None:
+        """Remove what an interrupted installation has left; to be called before the first one.
+
+        :raises Refused: when the disk is unwilling
+        """
+        await asyncio.to_thread(self._tidy)
 
     async def installed(self) -> dict[str, Manifest]:
         """Return the manifests of the installed RApps by name."""
         return await asyncio.to_thread(self.folder.list)
+
+    def _alone(self, name: str) -> asyncio.Lock:
+        return self._busy.setdefault(name, asyncio.Lock())
+
+    def _started(self, name: str, version: str, ok: bool) -> Installed | None:
+        if ok:
+            self.folder.settle(name, version)
+            return None
+        there = self.folder.find(name)
+        return self.folder.go_back(name) if there is not None and there.version == version else None
+
+    def _tidy(self) -> None:
+        try:
+            self._downloads.tidy()
+        except OSError as error:
+            raise Refused(f"cannot tidy up downloads: {error.strerror}, check the disk") from None
+        self.folder.tidy()
 
     def _install(self, transport: "_LoopTransport", wish: "_Wish", tell: _Tell) -> Installed:
         store = TrustedStore(transport, f"{self._client.base_url}/tuf", self._root, self._home / "trust", self._limits.package)
         try:
             offered = store.versions(wish.name)
             release = choose(offered, wish.name, wish.version, wish.robot.name if wish.robot else None)
-            present = self.folder.find(wish.name, release.version.text)
-            if present is not None and self.folder.find(wish.name) == present:
+            present = self._present(release, wish)
+            if present is not None:
+                self.folder.use(present)
                 return present
             if wish.version is None:
                 self._check_not_older(release, offered)
-            aside = self._new_file()
-            try:
-                return self._fetch(store, release, aside, wish, tell)
-            finally:
-                aside.unlink(missing_ok=True)
+            with self._quota.claim(wish.name) as claim:
+                return self._fetch(store, release, wish, tell, claim)
         except OSError as error:
             raise Refused(f"cannot install {wish.name}: {error.strerror}, check the disk") from None
+
+    def _present(self, release: Release, wish: "_Wish") -> Installed | None:
+        """Return what is installed when nothing better is on offer: the newest, or the one before a version that failed."""
+        there = self.folder.find(wish.name)
+        failed = self.folder.failed(wish.name) if wish.version is None else None
+        return there if there is not None and release.version.text in (there.version, failed) else None
 
     def _check_not_older(self, release: Release, offered: Versions) -> None:
         """Refuse to go back behind what is installed, unless its publisher took that off offer.
@@ -133,24 +179,22 @@ class Delivery:
             older = f"cannot install {release.name} {release.version.text}: {there.version} is installed"
             raise Untrusted(Attack.ROLLBACK, f"{older}; remove it first if the older one is wanted")
 
-    def _fetch(self, store: TrustedStore, release: Release, aside: Path, wish: "_Wish", tell: _Tell) -> Installed:
-        name, version = release.name, release.version.text
-        tell("downloading", version=version, bytes=0, of=release.length)
-        store.download(release, aside, lambda count, _: tell("downloading", bytes=count, of=release.length))
+    def _fetch(self, store: TrustedStore, release: Release, wish: "_Wish", tell: _Tell, claim: Claim) -> Installed:
+        name, version, length = release.name, release.version.text, release.length
+        package = self._downloads.file(name, version, "".join(release.target.hashes.values()))
+        claim(length)
+        tell("downloading", version=version, bytes=0, of=length)
+        store.download(release, package, lambda count, _: tell("downloading", bytes=count, of=length))
         tell("verified", version=version)
-        done = install(PackageFile(aside, name, version, self._limits.package, wish.check), self.folder)
+        try:
+            if self._quota.limit:
+                with package.open("rb") as file:
+                    claim(length + unpacked_size(inspect(file, self._limits.package)))
+            done = install(PackageFile(package, name, version, self._limits.package, wish.check), self.folder)
+        finally:
+            package.unlink(missing_ok=True)
         tell("installed", version=done.version, path=str(done.path))
         return done
-
-    def _new_file(self) -> Path:
-        """Return the name of a file to download to; files that a power cut left behind go."""
-        folder = self._home / "downloads"
-        folder.mkdir(parents=True, exist_ok=True)
-        too_old = time.time() - 2 * self._limits.package_timeout
-        for path in folder.glob("*.hz"):
-            if path.stat().st_mtime < too_old:
-                path.unlink(missing_ok=True)
-        return folder / f"{secrets.token_hex(8)}.hz"
 
 
 @dataclass(frozen=True)
@@ -179,13 +223,13 @@ class _LoopTransport:
         self._running: concurrent.futures.Future[int] | None = None
         self._cancelled = False
 
-    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None) -> None:
+    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None, start: int = 0) -> None:
         """Fetch `url`; see `trust.Transport`."""
         timeout = self._limits.metadata_timeout if "/metadata/" in url else self._limits.package_timeout
         with self._lock:
             if self._cancelled:
                 raise Unreachable(f"cannot fetch {url}: it was given up")
-            work = self._watched(url, write, limit, timeout, on_progress)
+            work = self._watched(url, write, limit, timeout, on_progress, start)
             self._running = asyncio.run_coroutine_threadsafe(work, self._loop)
         try:
             self._running.result(timeout + 5)
@@ -195,7 +239,7 @@ class _LoopTransport:
             self._running.cancel()
             raise Unreachable(f"cannot fetch {url} within {timeout:g} s: try again later") from None
 
-    async def _watched(self, url: str, write: Writer, limit: int, timeout: float, on_progress: Progress | None) -> int:
+    async def _watched(self, url: str, write: Writer, limit: int, timeout: float, on_progress: Progress | None, start: int) -> int:
         """Fetch, and give up a line that is kept open by a trickle (Uptane's slow retrieval)."""
         count = before = 0
 
@@ -204,7 +248,7 @@ class _LoopTransport:
             count += len(piece)
             return write(piece)
 
-        work = asyncio.ensure_future(self._client.download(url, counted, limit, timeout, on_progress))
+        work = asyncio.ensure_future(self._client.download(url, counted, limit, timeout, on_progress, start))
         try:
             while not (await asyncio.wait([work], timeout=self._limits.window))[0]:
                 if 0 < count < before + self._limits.slowest * self._limits.window:

@@ -1,11 +1,14 @@
 """Installed RApps on a disk: `install(source, destination)`, its undo `remove`, and the way back to the version before.
 
-Layout: `<root>/<name>/<version>/`, the links `current` and `previous` beside it. A version appears whole or not at all:
-unpacked aside, brought to the disk, renamed; then `current` is switched by renaming a link over it. Power loss leaves
-what was. The version before stays (DESIGN §3.4), older ones go.
+Layout: `<root>/<name>/<version>/` and links beside it: `current`; `previous`, the last version that has started, there
+only until `current` has started too (DESIGN §3.4); `failed`, a version that did not. A version appears whole or not at
+all: unpacked aside, brought to the disk, renamed; then `current` is switched by renaming a link over it. Power loss
+leaves what was; what else it leaves goes with the next call. When a RApp was used last is its folder's time.
 """
 
+import contextlib
 import errno
+import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterator
@@ -20,9 +23,9 @@ from rapp_hop.hz.lock import held
 from rapp_hop.hz.manifest import Manifest, parse_manifest
 from rapp_hop.hz.semver import parse_version
 from rapp_hop.hz.tar import Limits
-from rapp_hop.hz.text import check_name
+from rapp_hop.hz.text import NAME, check_name
 
-CURRENT, PREVIOUS = "current", "previous"
+CURRENT, PREVIOUS, FAILED = "current", "previous", "failed"
 _ASIDE = ".aside-"  # begin of every name that is not finished or not wanted any more
 
 
@@ -87,8 +90,7 @@ class RappFolder:
     def list(self) -> dict[str, Manifest]:
         """Return the manifest of the current version of each installed RApp; a damaged one is left out."""
         found: dict[str, Manifest] = {}
-        names = sorted(path.name for path in self.root.iterdir() if path.is_dir()) if self.root.is_dir() else []
-        for name in names:
+        for name in self.names():
             try:
                 installed = self.find(name)
                 if installed is not None:
@@ -96,6 +98,36 @@ class RappFolder:
             except (HopError, OSError):
                 continue
         return found
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all RApps of which something is here."""
+        found = self.root.iterdir() if self.root.is_dir() else iter(())
+        return tuple(sorted(path.name for path in found if NAME.fullmatch(path.name) and path.is_dir()))
+
+    def last_used(self, name: str) -> float:
+        """Return when a RApp was installed or used last, in s since 1970; 0 when it is not there."""
+        installed = self.find(name)
+        try:
+            return installed.path.stat().st_mtime if installed else 0.0
+        except FileNotFoundError:
+            return 0.0
+
+    def failed(self, name: str) -> str | None:
+        """Return the version that was gone back from, if any."""
+        return self._linked(check_name(name), FAILED)
+
+    def use(self, installed: Installed) -> None:
+        """Note that a RApp is used now; a disk that cannot be written to notes nothing."""
+        with contextlib.suppress(OSError):
+            os.utime(installed.path)
+
+    def tidy(self) -> None:
+        """Remove what an interrupted call has left, or finish it.
+
+        :raises Refused: when the disk is unwilling
+        """
+        with self._locked():
+            pass
 
     def place(self, source: Source) -> Installed:
         """Put the source's version beside the others and make it the current one.
@@ -110,7 +142,6 @@ class RappFolder:
             if there is None:
                 self._unpack(source, name, version)
             self._switch(name, version)
-            self._prune(name)
         return Installed(name, version, self.root / name / version, new=there is None)
 
     def remove(self, name: str) -> bool:
@@ -121,18 +152,27 @@ class RappFolder:
             self._throw_away(self.root / name)
             return True
 
+    def settle(self, name: str, version: str) -> bool:
+        """A version has started: the one before is needed no more. False when there is nothing to settle."""
+        with self._locked():
+            if self._linked(check_name(name), CURRENT) != version or self._linked(name, PREVIOUS) is None:
+                return False
+            (self.root / name / PREVIOUS).unlink()
+            sync_folder(self.root / name)
+            self._prune(name)
+            return True
+
     def go_back(self, name: str) -> Installed:
-        """Make the version before the current one again and throw the failed one away.
+        """Make the version before the current one again, throw the failed one away and remember it.
 
         :raises Refused: when there is no version before
         """
         with self._locked():
-            failed, before = self._linked(name, CURRENT), self._linked(name, PREVIOUS)
+            failed, before = self._linked(check_name(name), CURRENT), self._linked(name, PREVIOUS)
             if before is None or failed is None or self.find(name, before) is None:
                 raise Refused(f"cannot go back with {name}: there is no version before, install it again")
-            _link(self.root / name, CURRENT, before)
-            (self.root / name / PREVIOUS).unlink()
-            self._throw_away(self.root / name / failed)
+            _link(self.root / name, FAILED, failed)
+            self._mend(name)
         return Installed(name, before, self.root / name / before)
 
     def _unpack(self, source: Source, name: str, version: str) -> None:
@@ -153,13 +193,31 @@ class RappFolder:
             raise
 
     def _switch(self, name: str, version: str) -> None:
-        folder, was = self.root / name, self._linked(name, CURRENT)
-        if was == version:
+        folder, was = self.root / name, self.find(name)
+        if self._linked(name, FAILED) == version:
+            (folder / FAILED).unlink()
+        if was is not None and was.version == version:
             return
-        if was is not None:
-            _link(folder, PREVIOUS, was)
+        if was is not None and self._linked(name, PREVIOUS) is None:
+            _link(folder, PREVIOUS, was.version)  # else `was` has never started, and the one before is the one to keep
         _link(folder, CURRENT, version)
         sync_folder(folder)
+        self._mend(name)
+
+    def _mend(self, name: str) -> None:
+        """Finish what was begun with a RApp's links, and remove what they do not lead to."""
+        folder, failed = self.root / name, self._linked(name, FAILED)
+        current, before = self._linked(name, CURRENT), self._linked(name, PREVIOUS)
+        if current is not None and current == failed and before is not None and self.find(name, before) is not None:
+            _link(folder, CURRENT, before)
+            current = before
+        if before is not None and before == current:
+            (folder / PREVIOUS).unlink()
+            sync_folder(folder)
+        self._prune(name)
+        if current is None:
+            with contextlib.suppress(OSError):
+                folder.rmdir()  # only when nothing is in it
 
     def _prune(self, name: str) -> None:
         kept = {self._linked(name, CURRENT), self._linked(name, PREVIOUS)}
@@ -189,6 +247,8 @@ class RappFolder:
                     shutil.rmtree(path, ignore_errors=True)
                 for link in self.root.glob(f"*/{_ASIDE}*"):
                     link.unlink()
+                for name in self.names():
+                    self._mend(name)
                 yield
         except OSError as error:
             step = "free some space" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "check the folder"

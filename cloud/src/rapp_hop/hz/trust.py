@@ -11,7 +11,7 @@ No network here: bytes come through the port `Transport`. The updater keeps what
 Blocking: call it in a thread. One caller at a time (locks see to it).
 """
 
-import tempfile
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,6 +30,7 @@ from tuf.ngclient.updater import Updater
 from rapp_hop.errors import Bug, Invalid, Refused, Unreachable
 from rapp_hop.hz.archive import package_file_name
 from rapp_hop.hz.attacks import Attack, Away, Untrusted, translated, untrusted
+from rapp_hop.hz.downloads import partial
 from rapp_hop.hz.lock import held
 from rapp_hop.hz.semver import Version, parse_version
 from rapp_hop.hz.tar import Limits
@@ -47,10 +48,11 @@ _PATIENCE = 60.0  # seconds for another process that looks at the store
 class Transport(Protocol):
     """Brings the bytes of a URL; sizes and times are bounded here, so an implementation does one thing."""
 
-    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None) -> None:
+    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None, start: int = 0) -> None:
         """Hand all bytes of `url` to `write` within the transport's time limit.
 
-        :param limit: bytes; more is `Invalid`
+        :param limit: bytes of the whole; more is `Invalid`
+        :param start: bytes that are here already: only what follows is handed over
         :raises HopError: `Refused` with the HTTP status when the server says no, `Unreachable`, `Invalid`
         """
 
@@ -109,7 +111,9 @@ class TrustedStore:
             return Versions(tuple(sorted(releases, key=lambda item: item.version.key)), frozenset(yanked))
 
     def download(self, release: Release, destination: Path, on_progress: Progress | None = None) -> None:
-        """Write the package of `release` to `destination`, verified; nothing is written when it is wrong.
+        """Write the package of `release` to `destination`, verified as a whole; nothing is left when it is wrong.
+
+        What has come stays when the line breaks, and the next download to the same destination goes on from it.
 
         :raises Untrusted: naming the attack
         :raises Unreachable: when the store cannot be reached or the line is cut
@@ -117,7 +121,7 @@ class TrustedStore:
         """
         if release.length > self._limits.packed:
             raise Invalid(f"cannot download {release.name}: {release.length} bytes, {self._limits.packed} are allowed")
-        with self._lock, translated(Attack.WRONG_CONTENT), self._fetcher.watched(on_progress):
+        with self._lock, translated(Attack.WRONG_CONTENT), self._fetcher.watched(on_progress, destination):
             with self._alone():
                 updater = self._updater()
                 target = updater.get_targetinfo(release.target.path)
@@ -125,7 +129,13 @@ class TrustedStore:
                 raise Refused(f"cannot download {release.name} {release.version}: the store offers it no more")
             if target != release.target:
                 raise Unreachable(f"cannot download {release.name}: the store changed meanwhile, try again")
-            updater.download_target(target, str(destination))
+            resumed = destination.exists()
+            try:
+                updater.download_target(target, os.devnull)  # what it verifies lies in `destination` already
+            except tuf.RepositoryError:
+                if not resumed:
+                    raise
+                updater.download_target(target, os.devnull)  # what was here of it may be to blame
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -213,24 +223,27 @@ class _Fetcher(FetcherInterface):
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
         self._on_progress: Progress | None = None
+        self._destination: Path | None = None
 
     @contextmanager
-    def watched(self, on_progress: Progress | None) -> Iterator[None]:
-        self._on_progress = on_progress
+    def watched(self, on_progress: Progress | None, destination: Path) -> Iterator[None]:
+        self._on_progress, self._destination = on_progress, destination
         try:
             yield
         finally:
-            self._on_progress = None
+            self._on_progress = self._destination = None
 
     def _fetch(self, url: str) -> Iterator[bytes]:
         raise tuf.DownloadError(f"cannot fetch {url} without a limit")
 
     @contextmanager
     def download_file(self, url: str, max_length: int) -> Iterator[IO[bytes]]:
-        with tempfile.TemporaryFile() as file:
-            on_progress = None if "/metadata/" in url else self._on_progress
+        on_progress, destination = (None, None) if "/metadata/" in url else (self._on_progress, self._destination)
+        with partial(destination, max_length) as file:
+            start = file.seek(0, os.SEEK_END)
             try:
-                self._transport.get(url, file.write, max_length, on_progress)
+                if start < max_length:
+                    self._transport.get(url, file.write, max_length, on_progress, start)
             except (Refused, Bug) as error:
                 raise tuf.DownloadHTTPError(str(error), error.status or 403) from None
             except Invalid as error:

@@ -15,8 +15,9 @@ from rapp_core.control.listening import Listener
 from rapp_core.control.platform import Platform
 from rapp_core.control.question import which
 from rapp_core.control.refusals import not_installed, not_interpreted, not_started
+from rapp_core.control.trial import Trial
 from rapp_core.control.words import NONE_OF_THEM, NOT_UNDERSTOOD, READY, READY_ALONE
-from rapp_core.errors import CoreError, Refused, Unreachable
+from rapp_core.errors import CoreError, Invalid, Refused, Unreachable
 from rapp_core.launcher.lease import Lease
 from rapp_core.ports import Agent, Agents, Hop, Robot
 from rapp_core.services.executor import Executor
@@ -53,6 +54,7 @@ class Control:
         self._parts = parts
         self._listener = Listener(parts.robot, parts.config, parts.now)
         self._recording = parts.config.home / "listening" / "command.ogg"
+        self._trial = Trial(parts.hop, parts.trace)
         self._run: Agent | None = None
 
     # s1, s2: initialise, register
@@ -135,24 +137,27 @@ class Control:
         try:
             answer = parts.hop.request("install", {"name": name}, parts.config.install_timeout)
             share.memory["package"] = Path(answer["path"])
-        except Unreachable as error:
-            known = parts.platform.rapps().get(name)
-            if known is None or known.path is None:
-                self._problem(share, not_installed(name, error), error)
-            else:
-                share.memory["package"] = known.path
         except CoreError as error:
-            self._problem(share, not_installed(name, error), error)
+            known = parts.platform.rapps().get(name)
+            if isinstance(error, Unreachable | Refused) and known is not None and known.path is not None:
+                _log.warning("%s; %s %s runs", error, name, known.version)
+                share.memory["package"] = known.path
+            else:
+                self._problem(share, not_installed(name, error), error)
 
     # s7 to s9: the dynamic agent lives
 
     def activate(self, share: Subsystem) -> None:
         """Start the dynamic agent and give it the lease; its cloud agent, if it has one, is started beside it."""
-        parts = self._parts
+        parts, package = self._parts, Path(str(share.memory["package"]))
+        self._trial.begin(package)
         try:
-            self._run = parts.launcher.activate(Path(str(share.memory["package"])), parts.trace.of_dynamic)
+            self._run = parts.launcher.activate(package, self._trial.told)
         except CoreError as error:
             self._problem(share, "I cannot start it", error)
+            if isinstance(error, Invalid):
+                self._trial.failed(str(error))
+                self._end_trial(share)
             return
         parts.lease.grant(self._run)
         parts.cloud_agents.begin(self._run)
@@ -166,6 +171,7 @@ class Control:
         late = self._parts.now() > float(str(share.memory["until"]))
         if late or self._parts.stop.is_set() or self._parts.lease.problem(True) is not None or run.outcome is not None:
             _log.warning("run %s: no first word: %s", run.name, run.outcome or "dead, silent or late")
+            self._trial.failed(run.outcome[1] if run.outcome is not None else "no first word")
             share.memory["problem"] = "It did not start"
         self._look_at_cloud_agent(share)
 
@@ -181,6 +187,7 @@ class Control:
             problem = self._parts.lease.problem(self._parts.executor.busy)
             if problem is not None:
                 _log.warning("run %s: %s", run.name, problem)
+                self._trial.failed(problem)
                 share.memory["problem"] = problem
 
     def _look_at_cloud_agent(self, share: Subsystem) -> None:
@@ -194,12 +201,13 @@ class Control:
         if outcome is not None and outcome[0] != "done":
             share.memory["problem"] = "It has failed"
             _log.warning("the dynamic agent failed: %s", outcome[1])
+            self._trial.failed(outcome[1])
         self._look_at_cloud_agent(share)
         return outcome is not None or share.memory["problem"] is not None or self._parts.stop.is_set()
 
     # s10, s11: destroy, apologise
 
-    def destroy(self, _share: Subsystem) -> None:
+    def destroy(self, share: Subsystem) -> None:
         """Dismantle in the order of DESIGN section 3.5, kill, release the lease, warm the next spare.
 
         The robot is stopped before anything that takes time; a run that has not come to its end by itself is not waited for.
@@ -218,6 +226,13 @@ class Control:
         self._close_senses()
         self._end_run()
         parts.launcher.prepare()
+        self._end_trial(share, run)
+
+    def _end_trial(self, share: Subsystem, run: Agent | None = None) -> None:
+        """A version that did not start has given way to the one before, unless the robot is ending."""
+        if not self._parts.stop.is_set():
+            words = self._trial.end(run.name if run else "", bool(run and run.first_word.is_set()))
+            share.memory["problem"] = words or share.memory.get("problem")
 
     def _stop_cloud_agent(self, run: Agent) -> None:
         """The dynamic agent has stopped its cloud agent; if it could not, the core agent does, before it ends the dynamic one."""
