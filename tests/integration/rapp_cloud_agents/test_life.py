@@ -10,6 +10,7 @@ import pytest
 
 from fakes.cloud_agents import PROBE, Workshop, call, in_workshop, until
 from fakes.whole_robot import processes_of
+from rapp_cloud.cloud_agents.confined import Confined
 from rapp_cloud.cloud_agents.orphans import clear
 from rapp_cloud.cloud_agents.sandbox import Limits
 from rapp_hop.errors import Bug, HopError, Refused, Unreachable
@@ -43,6 +44,23 @@ def test_a_warm_spare_becomes_a_cloud_agent(tmp_path: Path) -> None:
     for kind, times in took.items():
         print(f"\nms from the order until it serves, {kind}: {', '.join(f'{each:.1f}' for each in times)}", end="")
     print()
+
+
+def test_a_sandbox_nobody_waits_for_any_more_leaves_nothing(tmp_path: Path) -> None:
+    """bubblewrap's child waits for its parent before it is confined: killed alone, the parent would leave it behind."""
+    slow, child = tmp_path / "slow", tmp_path / "child"
+    slow.write_text(f"#!/bin/sh\nsleep 300 &\necho $! > {child}.new\nmv {child}.new {child}\nwait\n")
+    slow.chmod(0o700)
+
+    async def test() -> None:
+        starting = asyncio.create_task(Confined.start([str(slow)], [], tmp_path / "log"))
+        await until(child.exists)
+        starting.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await starting
+        await until(lambda: not Path(f"/proc/{int(child.read_text())}/cmdline").exists())
+
+    asyncio.run(test())
 
 
 def test_a_spare_that_died_is_not_used(tmp_path: Path) -> None:

@@ -23,9 +23,10 @@ class Confined:
         self.first = first
         self._process = process
         self._first_handle = os.pidfd_open(first)
-        self._handle = os.pidfd_open(process.pid)
+        self._there = {self._first_handle, os.pidfd_open(process.pid)}
         self._ended = asyncio.Event()
-        asyncio.get_running_loop().add_reader(self._handle, self._reap)
+        for handle in self._there:
+            asyncio.get_running_loop().add_reader(handle, self._gone, handle)
 
     @classmethod
     async def start(cls, words: Sequence[str], passed: Sequence[int], log: Path) -> "Confined":
@@ -50,14 +51,16 @@ class Confined:
             raise Refused(f"cannot confine a cloud agent here: {words[0]}: {error.strerror}; {NEEDS}") from None
         finally:
             os.close(tell)
+        started = None
         try:
-            first = await _first_process(told)
-            return cls(process, first)
+            started = cls(process, await _first_process(told))
+            return started
         except (Invalid, TimeoutError, OSError):
-            process.kill()
-            process.wait()
             said = log.read_text(errors="replace").strip().splitlines()[-1:] or ["it ended without a word"]
             raise Refused(f"cannot confine a cloud agent here: {said[0][:200]}; {NEEDS}") from None
+        finally:
+            if started is None:  # also when nobody waits for it any more
+                _kill_unborn(process)
 
     @property
     def pid(self) -> int:
@@ -82,21 +85,29 @@ class Confined:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(self.first, signal.SIGTERM)
             await self.wait(patience)
-        handle, self._first_handle = self._first_handle, -1
-        if handle >= 0:
+        if self._first_handle in self._there:
             with contextlib.suppress(ProcessLookupError):
-                signal.pidfd_send_signal(handle, signal.SIGKILL)
-            os.close(handle)
+                signal.pidfd_send_signal(self._first_handle, signal.SIGKILL)
         if not await self.wait(KILLED):  # bubblewrap itself stands still
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self._process.pid, signal.SIGKILL)
             await self._ended.wait()
 
-    def _reap(self) -> None:
-        asyncio.get_running_loop().remove_reader(self._handle)
-        os.close(self._handle)
-        self._process.wait()
-        self._ended.set()
+    def _gone(self, handle: int) -> None:
+        """One of the two has ended; bubblewrap may be the first."""
+        asyncio.get_running_loop().remove_reader(handle)
+        os.close(handle)
+        self._there.discard(handle)
+        if not self._there:
+            self._process.wait()
+            self._ended.set()
+
+
+def _kill_unborn(process: subprocess.Popen[bytes]) -> None:
+    """Kill a bubblewrap that has not told its child yet, with that child: alone it would wait for its parent for ever."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
 
 
 async def _first_process(told: int) -> int:
