@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(900)]
 
 AWAY = 1.5  # s a process is away: longer than the link may be silent, and than a lease without heartbeat
 BOUND = 10.0  # s to listen again once it is back: a call of NAOqi that hangs, and saying what failed
-FAULTS = [(name, how) for name in ("nao_sim", "rosbridge", "link", "roscore") for how in ("killed", "frozen")]
+FAULTS = [(name, how) for name in ("nao_sim", "rosbridge", "link", "roscore", "core_agent") for how in ("killed", "frozen")]
 
 ENTRY = {
     "lazy": "communication.rapp_say('here')\nself.pause(3)",
@@ -197,6 +197,11 @@ def show(cells: Table) -> None:
         row = [cells[(state, *fault)] for fault in FAULTS]
         texts = ["failed" if cell.problem else f"{cell.listening:.1f} / {cell.served:.1f}" for cell in row]
         print(f"{state:14}" + "".join(f"{text:>19}" for text in texts))
+
+
+def test_l07_a_core_agent_killed_in_every_state_comes_back_to_a_known_one_without_orphans(table: Table) -> None:
+    """That the robot is at rest then, is seen by `test_guard` and `test_motion_faults`."""
+    assert {state: table[state, "core_agent", "killed"].problem for state in STATES} == dict.fromkeys(STATES, "")
 
 
 @pytest.mark.parametrize("state", STATES)

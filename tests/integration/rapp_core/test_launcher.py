@@ -184,6 +184,24 @@ def test_orphans_are_killed_and_their_folders_removed(tmp_path, wait_for):
     assert not folder.exists()
 
 
+def test_l07_a_sandbox_that_was_about_to_start_is_killed(tmp_path):
+    """Its parent has died in its first moments, before anything was noted; it is known by its folder."""
+    folder = tmp_path / "runs" / "old"
+    folder.mkdir(parents=True)
+    read, write = os.pipe()  # nobody writes: it waits, as one whose parent died does
+    words = ["bwrap", "--dev-bind", "/", "/", "--ro-bind", str(folder), f"{folder}/", "--block-fd", str(read), "sleep", "60"]
+    waiting = subprocess.Popen(words, pass_fds=[read])
+    try:
+        orphans.clear(tmp_path / "runs")
+        assert waiting.wait(20) == -signal.SIGKILL
+        assert not folder.exists()
+    finally:
+        waiting.kill()
+        waiting.wait()
+        os.close(read)
+        os.close(write)
+
+
 def test_l12_a_process_id_used_again_by_another_is_left_alone(tmp_path):
     other = subprocess.Popen(["sleep", "60"], start_new_session=True)
     try:

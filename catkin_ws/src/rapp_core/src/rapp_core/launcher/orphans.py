@@ -27,7 +27,21 @@ def clear(runs: Path) -> None:
             if started == _started(int(pid)) != "":
                 _log.warning("killing process %s, left by an earlier core agent", pid)
                 os.killpg(int(pid), signal.SIGKILL)
+        for sandbox in _about_to_start(folder):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(sandbox, signal.SIGKILL)
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _about_to_start(folder: Path) -> list[int]:
+    """Process ids of bubblewraps whose words name the folder: one whose parent died in its first moments waits for ever."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            program, *words = path.read_bytes().decode(errors="replace").split("\0")
+            if program.endswith("bwrap") and any(word.startswith(f"{folder}/") for word in words):
+                found.append(int(path.parent.name))
+    return found
 
 
 def _started(pid: int) -> str:
