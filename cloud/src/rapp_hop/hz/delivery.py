@@ -139,11 +139,11 @@ class Delivery:
         return self.folder.go_back(name) if there is not None and there.version == version else None
 
     def _tidy(self) -> None:
+        self.folder.tidy()
         try:
-            self._downloads.tidy()
+            self._downloads.tidy(self.folder.find)
         except OSError as error:
             raise Refused(f"cannot tidy up downloads: {error.strerror}, check the disk") from None
-        self.folder.tidy()
 
     def _install(self, transport: "_LoopTransport", wish: "_Wish", tell: _Tell) -> Installed:
         store = TrustedStore(transport, f"{self._client.base_url}/tuf", self._root, self._home / "trust", self._limits.package)

@@ -4,9 +4,10 @@ A file is named after version and hash of its package, which is checked over the
 RApp has one at most; one that nobody goes on with is removed after `KEPT`.
 """
 
+import re
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
@@ -14,6 +15,7 @@ from typing import IO
 from rapp_hop.hz.attacks import Away
 
 KEPT = 86400.0  # seconds
+_FORM = re.compile(r"([a-z][a-z0-9_]*)~([0-9A-Za-z.+-]+)~[0-9a-f]+\.part", re.ASCII)
 
 
 class Downloads:
@@ -36,10 +38,14 @@ class Downloads:
         found = self._folder.iterdir() if self._folder.is_dir() else iter(())
         return {path: path.name.partition("~")[0] for path in sorted(found, key=_age)}
 
-    def tidy(self) -> None:
-        """Remove what no download will go on from: parts that are older than `KEPT`, and what is no part."""
+    def tidy(self, installed: Callable[[str, str], object]) -> None:
+        """Remove what no download will go on from: parts older than `KEPT` or of what is installed, and what is no part.
+
+        :param installed: tells of a name and a version
+        """
         for path in self.parts():
-            if path.suffix != ".part" or abs(time.time() - _age(path)) > KEPT:
+            form = _FORM.fullmatch(path.name)
+            if form is None or abs(time.time() - _age(path)) > KEPT or installed(form[1], form[2]):
                 path.unlink(missing_ok=True)
 
 
