@@ -15,7 +15,7 @@ from rapp_cloud.cloud_agents.orphans import clear
 from rapp_cloud.cloud_agents.sandbox import Limits
 from rapp_hop.errors import Bug, HopError, Refused, Unreachable
 
-QUICK = Limits(start=3.0, silence=3.0, terminate=0.5, life=1000.0)
+QUICK = Limits(start=6.0, silence=4.0, terminate=0.5, life=1000.0)
 
 
 def nothing_runs(shop: Workshop) -> bool:

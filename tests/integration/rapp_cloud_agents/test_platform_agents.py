@@ -203,12 +203,12 @@ def test_c07_agents_take_no_port(cloud: CloudProcess) -> None:
 
 def test_c05_the_agents_of_a_robot_that_disappears_are_gone_with_its_lease(tmp_path: Path) -> None:
     """The lease is 15 s by default; with the look and the end of the processes that is less than the 30 s of DESIGN 3.1."""
-    with cloud_process(tmp_path, rapps(tmp_path), lease=2.0) as cloud:
+    with cloud_process(tmp_path, rapps(tmp_path), lease=4.0) as cloud:
 
         async def test(nao: HopClient, other: HopClient) -> None:
             agent = await start(nao)
             loop = asyncio.get_running_loop()
-            until_ = loop.time() + 4.0  # two leases long
+            until_ = loop.time() + 6.0  # longer than the lease
             while loop.time() < until_:
                 assert (await nao.call("heartbeat"))["registered"]
                 await asyncio.sleep(0.2)
