@@ -603,3 +603,72 @@ def test_a_robot_that_cannot_be_let_rest_does_not_keep_the_core_agent(home: Home
     ask(home)
     home.fake.motion.release = lambda: home.fake.motion.take_posture("none", 1.0)  # type: ignore[method-assign]
     assert home.round() == KEYWORD
+
+
+# a new version that does not start, or cannot be installed
+
+BACK = "The new version did not start, the one before is back"
+
+
+def update(home: Home) -> None:
+    """The platform offers clock 2.0.0; 1.0.0 has run here."""
+    old = install_rapp(home.config.home, "clock", keywords=("what time is it",))
+    home.link.catalogue[0]["version"] = "2.0.0"
+    new = write_rapp(old.parent / "2.0.0", "clock", version="2.0.0", keywords=("what time is it",))
+    home.link.answers["started"] = {"back": "1.0.0"}
+
+    def install(_arguments: object) -> dict[str, Any]:
+        (old.parent / "previous").symlink_to("1.0.0")
+        (old.parent / "current").unlink()
+        (old.parent / "current").symlink_to("2.0.0")
+        return {"name": "clock", "version": "2.0.0", "path": str(new), "installed": True}
+
+    home.link.answers["install"] = install
+    home.start()
+    ask(home)
+
+
+@pytest.mark.parametrize(
+    "script",
+    [Script(first_word=None, terminate=0.1, outcome=("failed", "SyntaxError")), Script(first_word=None, terminate=None, crash=0.1)],
+)
+def test_a_new_version_that_does_not_start_gives_way_and_the_robot_says_so(home: Home, script: Script) -> None:
+    home.agents.script = script
+    update(home)
+    assert home.round()[-3:] == ["s10", "s11", "s3"]
+    assert home.fake.said() == [BACK]
+    ((_, told),) = [asked for asked in home.link.asked if asked[0] == "started"]
+    assert (told["name"], told["version"], told["ok"]) == ("clock", "2.0.0", False)
+
+
+def test_a_new_version_that_cannot_be_read_gives_way(home: Home) -> None:
+    home.agents.error = Invalid("cannot use it: its package.json is broken")
+    update(home)
+    home.round()
+    assert home.fake.said() == [BACK]
+
+
+def test_a_new_version_that_has_started_stays(home: Home) -> None:
+    update(home)
+    home.link.answers["started"] = {"back": None}
+    assert home.round() == KEYWORD
+    assert [told["ok"] for name, told in home.link.asked if name == "started"] == [True]
+
+
+@pytest.mark.parametrize("error", [Refused("cannot install clock: No space left on device"), Unreachable("cannot reach it")])
+def test_when_an_update_cannot_be_installed_the_version_that_is_here_runs(home: Home, error: Exception) -> None:
+    update(home)
+    home.link.errors["install"] = error  # type: ignore[assignment]
+    assert home.round() == KEYWORD
+    assert "activate 1.0.0" in home.fake.journal
+    assert home.fake.said() == []
+
+
+def test_when_an_update_is_not_to_be_trusted_nothing_runs(home: Home) -> None:
+    error = Invalid("cannot trust the store")
+    error.reason = "rollback"
+    update(home)
+    home.link.errors["install"] = error
+    home.round()
+    assert home.fake.said() == ["I refuse to install clock, it is older than what I had"]
+    assert home.agents.runs == []
