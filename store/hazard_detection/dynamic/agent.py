@@ -7,6 +7,7 @@ judges them. What is not sure is looked at again from another side. What is wron
 import logging
 import math
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,9 @@ Image = NDArray[np.uint8]
 Point = tuple[float, float, float]
 
 AROUND = (0.0, 0.9, 1.8, -0.9, -1.8)  # rad of the neck, that show together nearly everything round the robot
-UP = -0.1  # rad of the head's pitch while it looks for codes
+BETWEEN = (0.45, 1.35, -0.45, -1.35)
+SWEEPS = ((0.0, AROUND, -0.1), (0.0, BETWEEN, 0.05), (math.pi / 2, AROUND, 0.0))
+"""To find codes until there are enough: rad that the robot turns first, yaws and pitch of its head. Small ones may be missed."""
 NEEDED = 2  # codes: a single one says little of the side from which it is seen
 SIDEWAYS = 1.5  # rad to which the head alone turns
 TRIES = 3  # of a picture: a camera that has slept may be late
@@ -49,6 +52,10 @@ YES, NO = "yes", "no"
 def say(text: str) -> None:
     """Say it, and go on when it has been said."""
     communication.text_to_speech(text)
+
+
+class _AwayError(Exception):
+    """The cloud agent does not answer."""
 
 
 class HazardDetection(DynamicAgent):
@@ -105,9 +112,10 @@ class HazardDetection(DynamicAgent):
         share.memory["away"] = False
         sights: dict[str, Sight] = {}
         try:
-            for yaw in AROUND:
-                self._look_for_codes(yaw, sights)
-        except RappError as error:
+            for turn, yaws, pitch in SWEEPS:
+                if len(sights) < NEEDED:
+                    self._sweep(turn, yaws, pitch, sights)
+        except _AwayError as error:
             _log.error("%s", error)
             share.memory["away"] = True
             return
@@ -117,13 +125,26 @@ class HazardDetection(DynamicAgent):
         if pose is not None:
             navigation.set_global_pose(pose)
 
-    def _look_for_codes(self, yaw: float, sights: dict[str, Sight]) -> None:
-        navigation.move_joint(["HeadYaw", "HeadPitch"], [yaw, UP])
+    def _sweep(self, turn: float, yaws: Sequence[float], pitch: float, sights: dict[str, Sight]) -> None:
+        if turn:
+            sights.clear()  # they were seen from another side
+            try:
+                navigation.move_to(0.0, 0.0, turn)
+            except Refused as error:
+                _log.info("%s", error)
+        for yaw in yaws:
+            self._look_for_codes(yaw, pitch, sights)
+
+    def _look_for_codes(self, yaw: float, pitch: float, sights: dict[str, Sight]) -> None:
+        navigation.move_joint(["HeadYaw", "HeadPitch"], [yaw, pitch])
         picture = _taken(vision.QUAD_VGA)
         if picture is None:
             return
         camera = navigation.get_transform("CameraTop", navigation.ROBOT)
-        found = cloud.call_agent_wait("find_codes", {"picture": self._written("around", picture)}, CALL)
+        try:
+            found = cloud.call_agent_wait("find_codes", {"picture": self._written("around", picture)}, CALL)
+        except RappError as error:
+            raise _AwayError(str(error)) from error
         size = (picture.shape[1], picture.shape[0])
         for code in found["codes"]:
             if code["text"] in self._codes:

@@ -103,6 +103,20 @@ def test_with_too_few_codes_it_says_that_it_does_not_know_where_it_is(names: tup
     assert core.posture == "Crouch"
 
 
+def test_a_code_that_was_missed_is_looked_for_again() -> None:
+    core = run(find_codes=one_by_one(*[seen("door")] * 7, *[seen("door", "lamp")] * 20))
+    (pose,) = [pose for name, pose in core.calls if name == "set_global_pose"]
+    assert (pose.x, pose.y) == pytest.approx((HERE.x, HERE.y), abs=1e-3)
+    assert "move_to" not in [name for name, _ in core.calls]
+
+
+def test_before_it_gives_up_it_turns() -> None:
+    core = run(find_codes=one_by_one(*[seen("door")] * 9, *[seen("door", "lamp")] * 5))
+    (turn,) = [argument for name, argument in core.calls if name == "move_to"]
+    assert turn == pytest.approx((0, 0, math.pi / 2))
+    assert core.said()[-1].startswith("everything is safe")
+
+
 def test_codes_that_cannot_be_where_they_are_seen_are_not_believed() -> None:
     codes = seen("door", "lamp")
     codes["codes"][0]["corners"] = [[x + 300, y + 90] for x, y in codes["codes"][0]["corners"]]
