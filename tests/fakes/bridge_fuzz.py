@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import zlib
 from copy import deepcopy
 from typing import Any
 
@@ -50,7 +51,9 @@ WORDS = (
 
 def new_seed() -> int:
     """RAPP_FUZZ_SEED, to see a failure again, or one that was never used."""
-    return int(os.environ.get("RAPP_FUZZ_SEED", 0)) or random.SystemRandom().randrange(1 << 32)
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID")  # processes that share the tests have to name them alike
+    fresh = zlib.crc32(run.encode()) if run else random.SystemRandom().randrange(1 << 32)
+    return int(os.environ.get("RAPP_FUZZ_SEED", 0)) or fresh
 
 
 class Fuzz:
