@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rapp_cli import bench, sim, test
+from rapp_cli import bench, runs, sim, test
 from rapp_cli.demo import command as demo
 from rapp_cli.home import down, listen, log, say, status, up
 from rapp_cli.hz import command as hz
@@ -31,6 +31,7 @@ COMMANDS = (
     Command("status", "show every agent, its state and since when", status.add_options, status.run),
     Command("log", "show what the agents write, and follow it", log.add_options, log.run),
     Command("trace", "draw the last run as a UML sequence diagram", trace.add_options, trace.run),
+    Command("runs", "show what robots have run, how long, what failed", runs.add_options, runs.run),
     Command("down", "end them", down.add_options, down.run),
     Command("new", "make a RApp to begin with", new.add_options, new.run),
     Command("run", "try a RApp on a simulated robot", trial.add_options, trial.run),

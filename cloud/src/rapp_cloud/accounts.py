@@ -65,6 +65,10 @@ class Accounts:
         found = self.holder(token)
         return found.name if found else None
 
+    def may(self, name: str, scope: str) -> bool:
+        """Tell whether some token of this name allows that."""
+        return any(holder.name == name and scope in holder.scopes for holder in self._known.values())
+
     def refresh(self) -> None:
         """See what other processes have changed since; the first time, everything.
 

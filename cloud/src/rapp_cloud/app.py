@@ -22,6 +22,7 @@ from rapp_cloud.memory import Memory, remembering
 from rapp_cloud.metrics import MeasuredServer, Metrics
 from rapp_cloud.profiles import Profiles
 from rapp_cloud.robots import Robots
+from rapp_cloud.runs_page import runs_page
 from rapp_cloud.services.agents import agent_calls, agent_services
 from rapp_cloud.services.people import people_services
 from rapp_cloud.services.presence import presence_services
@@ -86,6 +87,7 @@ async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Me
         *health(checks, metrics, memory.accounts.name_of),
         store_files("/tuf/metadata/", shelf.metadata),
         noted(store_files("/tuf/targets/", shelf.targets), memory),
+        runs_page(),
         weblets(shelf, "https" if tls else "http"),
         store_page(shelf),
         agent_calls(agents),
@@ -138,7 +140,7 @@ def _registry(
         [
             *presence_services(robots, shelf),
             *people_services(Profiles(config.data / "profiles")),
-            *run_services(memory.reports, memory.audit),
+            *run_services(memory.reports, memory.audit, memory.accounts),
             *voice_services(robots, shelf, run),
             *agent_services(agents, robots),
             *sight_services(),

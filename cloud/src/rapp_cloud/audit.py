@@ -70,7 +70,8 @@ class Audit:
     def note(self, who: str, deed: str, subject: str = "", **detail: Any) -> None:
         """Remember that somebody did something, for the next `write`; blocks nobody."""
         text = json.dumps(detail, sort_keys=True)[:_MOST]
-        row = {"at": round(self._clock(), 3), "who": who[:100], "deed": deed[:100], "subject": subject[:200], "detail": text}
+        words = {"who": _plain(who[:100]), "deed": deed[:100], "subject": _plain(subject[:200]), "detail": text}
+        row = {"at": round(self._clock(), 3), **words}
         self._waiting.append(row)
 
     def write(self) -> None:
@@ -142,6 +143,11 @@ class Audit:
 def _seal(key: bytes, before: str, row: Mapping[str, Any]) -> str:
     fields = [before, row["number"], f"{row['at']:.3f}", row["who"], row["deed"], row["subject"], row["detail"]]
     return hmac.new(key, json.dumps(fields).encode(), hashlib.sha256).hexdigest()
+
+
+def _plain(text: str) -> str:
+    """Return a stranger's words in a form that forges no line of a log."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def _detail(text: str) -> Mapping[str, Any]:

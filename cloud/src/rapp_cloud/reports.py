@@ -28,8 +28,8 @@ class Reports:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def keep(self, robot: str, run: dict[str, Any]) -> str:
-        """Keep a report and return its name; the same run again replaces it, so that sending twice does no harm."""
+    def keep(self, robot: str, run: dict[str, Any]) -> tuple[str, bool]:
+        """Keep a report; return its name, and whether it is new: the same run again replaces it, so sending twice does no harm."""
         text = strict_json.dumps(run)
         name = str(run.get("run", run.get("id", "")))
         if not _RUN.fullmatch(name):
@@ -37,17 +37,21 @@ class Reports:
         row = {"robot": check_name(robot), "run": name, "received": time.time(), "report": text}
         mine = runs.c.robot == robot
         with self._database.writing() as connection:
-            connection.execute(sa.delete(runs).where(mine, runs.c.run == name))
+            new = not connection.execute(sa.delete(runs).where(mine, runs.c.run == name)).rowcount
             connection.execute(sa.insert(runs).values(row))
             newest = sa.select(runs.c.run).where(mine).order_by(runs.c.received.desc(), runs.c.run).limit(KEPT)
             connection.execute(sa.delete(runs).where(mine, runs.c.run.not_in(newest)))
-        return name
+        return name, new
 
-    def of(self, robot: str) -> list[dict[str, Any]]:
-        """Return a robot's reports, the newest first."""
-        wanted = sa.select(runs.c.report).where(runs.c.robot == robot).order_by(runs.c.received.desc(), runs.c.run)
+    def of(self, robot: str | None, most: int = KEPT) -> list[dict[str, Any]]:
+        """Return the reports of a robot, or of all, the newest first, each with its `robot` and when it was `received`."""
+        wanted = sa.select(runs).order_by(runs.c.received.desc(), runs.c.run).limit(most)
+        if robot is not None:
+            wanted = wanted.where(runs.c.robot == robot)
         with self._database.reading() as connection:
-            return [strict_json.loads(text.encode(), limit=MAX_REPORT) for text in connection.execute(wanted).scalars()]
+            rows = connection.execute(wanted).all()
+        own = [strict_json.loads(row.report, limit=MAX_REPORT) for row in rows]
+        return [{**run, "robot": row.robot, "received": row.received} for run, row in zip(own, rows, strict=True)]
 
     def adopt(self, folder: Path) -> None:
         """Take over the files `<robot>/<run>.json` of an older platform; the folder is gone afterwards."""

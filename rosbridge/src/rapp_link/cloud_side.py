@@ -151,6 +151,8 @@ class Platform:
             except Unreachable:
                 raise
             except (Refused, Invalid, Bug) as error:
+                if error.status == 401:
+                    raise  # nothing is wrong with the report: this robot is not let in, until it has another token
                 # One that is refused today is refused tomorrow: it must not block the others for ever.
                 _log.error("report %s: %s", path.name, error)
             await in_thread(self._reports.done, path)

@@ -16,7 +16,8 @@ from rapp_link.letter import Outcome
 from rapp_link.smtp import Sender
 
 REPOSITORY, MAIL_SERVER, CLOUD_AGENT = "repository", "mail-server", "cloud-agent"
-UNTOLD = frozenset({"heartbeat", "list_rapps", "list_cloud_agents"})  # asked again and again, whether something happens or not
+UNTOLD = frozenset({"heartbeat", "list_rapps", "list_cloud_agents", "report"})
+"""Asked again and again, whether something happens or not; and what is said of runs that are over."""
 _AGENT = re.compile(r"agents/[^/]+/(.+)")  # address of a cloud agent's service, which is nobody's business
 _HASH = re.compile(r"^[0-9a-f]{64}\.")  # before the name of a file of the store
 

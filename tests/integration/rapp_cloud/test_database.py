@@ -115,12 +115,13 @@ def test_a_broken_token_file_is_named_and_stays(text: str, tmp_path: Path) -> No
 
 def test_reports_are_kept_once_per_run(database: Database) -> None:
     kept = Reports(database)
-    kept.keep("nao", {"run": "r-1", "outcome": "failed"})
-    assert kept.keep("nao", {"run": "r-1", "outcome": "done", "said": "\x00 „ä“"}) == "r-1"
+    assert kept.keep("nao", {"run": "r-1", "outcome": "failed"}) == ("r-1", True)
+    assert kept.keep("nao", {"run": "r-1", "outcome": "done", "said": "\x00 „ä“"}) == ("r-1", False)
     kept.keep("nao", {"run": "../../etc/passwd"})
     kept.keep("other", {"run": "r-1"})
     assert [run["run"] for run in kept.of("nao")] == ["../../etc/passwd", "r-1"]
-    assert kept.of("nao")[1] == {"run": "r-1", "outcome": "done", "said": "\x00 „ä“"}
+    assert kept.of("nao")[1]["said"] == "\x00 „ä“"
+    assert [(run["robot"], run["run"]) for run in kept.of(None, 1)] == [("other", "r-1")]
 
 
 def test_reports_are_bounded(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,7 +139,7 @@ def test_the_report_files_of_an_older_platform_are_taken_over(database: Database
     (folder / "r-2.json").write_text("{")
     kept = Reports(database)
     kept.adopt(tmp_path / "reports")
-    assert kept.of("nao") == [{"run": "r-1"}]
+    assert [run["run"] for run in kept.of("nao")] == ["r-1"]
     assert not (tmp_path / "reports").exists()
     kept.adopt(tmp_path / "reports")
 
@@ -235,7 +236,7 @@ def test_o01_a_locked_database_is_unreachable_and_then_not(database: Database, d
         with pytest.raises(Unreachable, match="try again later"):
             kept.keep("nao", {"run": "r-1"})
     kept.keep("nao", {"run": "r-1"})
-    assert kept.of("nao") == [{"run": "r-1"}]
+    assert [run["run"] for run in kept.of("nao")] == ["r-1"]
     other.close()
 
 

@@ -27,7 +27,7 @@ def add_store_options(parser: argparse.ArgumentParser) -> None:
 
 def store_of(options: argparse.Namespace) -> Shelf:
     """Open the store that the options name. Raises UsageError when there is none."""
-    data = _data(options)
+    data = data_of(options)
     shelf = open_shelf(data, passphrase_from(os.environ))
     if not shelf.root_file.exists():
         raise UsageError(f"cannot find a store in {data}: ./rapp up makes one, or name its folder with --data")
@@ -37,14 +37,14 @@ def store_of(options: argparse.Namespace) -> Shelf:
 @contextmanager
 def noting(options: argparse.Namespace, shelf: Shelf) -> Iterator[None]:
     """Have the platform's audit log note what the block changes of its offers."""
-    data = _data(options)
+    data = data_of(options)
     with noting_offers(data, shelf, load_config(data, {}, os.environ).database):
         yield
 
 
 def keys_of(options: argparse.Namespace) -> KeyRing:
     """The keys of the store that the options name."""
-    return KeyRing(_data(options) / "keys", passphrase_from(os.environ))
+    return KeyRing(data_of(options) / "keys", passphrase_from(os.environ))
 
 
 def told(run: Run) -> Run:
@@ -58,12 +58,15 @@ def told(run: Run) -> Run:
             raise UsageError(str(error)) from error
         except HopError as error:
             raise CommandError(str(error)) from error
+        except BrokenPipeError:
+            raise  # whoever read the output has gone
         except OSError as error:
             raise CommandError(f"cannot use {error.filename}: {error.strerror}") from error
 
     return running
 
 
-def _data(options: argparse.Namespace) -> Path:
+def data_of(options: argparse.Namespace) -> Path:
+    """The data folder of the platform that the options name."""
     data: Path | None = options.data
     return (data if data is not None else home_of(options).cloud).expanduser().resolve()

@@ -14,7 +14,8 @@ from rapp_core.config import Config, read
 from rapp_core.control.cloud_agent import CloudAgents
 from rapp_core.control.control import Control, Parts
 from rapp_core.control.fsm import core_machine
-from rapp_core.control.platform import Platform
+from rapp_core.control.platform import API_VERSION, Platform
+from rapp_core.control.run_reports import RunReports
 from rapp_core.errors import CoreError, Invalid
 from rapp_core.launcher.launcher import Launcher
 from rapp_core.launcher.lease import Lease
@@ -77,7 +78,9 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     context, hop = Context(nao, config, trace, config.home / "listening", cut=stop), RosHop(stop, trace)
     executor = Executor(context)
     platform, cloud_agents = Platform(hop, config), CloudAgents(hop, config)
-    control = Control(Parts(nao, hop, launcher, executor, platform, cloud_agents, lease, trace, config, stop))
+    reports = RunReports(launcher, hop, config.home, API_VERSION)
+    reports.start(trace)
+    control = Control(Parts(nao, hop, reports, executor, platform, cloud_agents, lease, trace, config, stop))
     RosServices(executor, Outside(hop, cloud_agents, config, stop), Keepsakes(config), lease, trace)
     RosActions(executor, lease, trace)
     machine, rejoining = core_machine(control), Rejoining()
@@ -97,6 +100,7 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
         for stream in topics:
             stream.close()
         control.close()
+        reports.close()
         platform.close()
         states.close()
         connection.close()
