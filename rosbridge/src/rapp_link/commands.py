@@ -117,7 +117,7 @@ class Commands:
     async def started(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
         """{run, name, version, ok, detail} → {back}: how the first start of a version ended; the version gone back to, or null.
 
-        Going back is reported with the run, at once and in what the core agent reports of it later.
+        Going back becomes part of what the core agent reports of the run.
         """
         run, name, version, ok, detail = take(arguments, run=str, name=str, version=str, ok=bool, detail=str)
         before = await self._store().started(name, version, ok)
@@ -125,7 +125,6 @@ class Commands:
             return {"back": None}
         _log.warning("%s %s did not start (%s): %s is back", name, version, detail, before.version)
         self._gone_back = {"run": run, "rolled_back": {"rapp": name, "from": version, "to": before.version, "why": detail[:500]}}
-        await self.report({"run": {"rapp": name, "version": version, "outcome": "failed", **self._gone_back}}, _ticket)
         return {"back": before.version}
 
     async def remove(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
