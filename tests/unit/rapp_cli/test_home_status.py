@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from fakes.rapps import install_rapp
 from rapp_cli.home import platform, status
 from rapp_cli.home.place import Home, Settings
 from rapp_cli.home.status import State, Status
@@ -92,6 +93,11 @@ def test_the_running_rapp_is_the_one_whose_package_is_in_a_run(home: Home) -> No
     assert status.read(home, BOTH).rapp is None
 
 
+def test_what_is_installed_on_the_robot(home: Home) -> None:
+    install_rapp(home.robot, "clock")
+    assert status.read(home, {}).installed == {"clock": "1.0.0"}
+
+
 def test_people_are_told_what_runs_since_when_and_why_not(home: Home) -> None:
     agents = [process("roscore", pid=7), process("link", state="BACKOFF", since=NOW - 7200, problem="it ended with status 1")]
     lines = status.text(home, Status(agents, State("s3", "listen", NOW - 5), None, None, 3), NOW).splitlines()
@@ -104,6 +110,7 @@ def test_people_are_told_what_runs_since_when_and_why_not(home: Home) -> None:
     rest = "\n".join(lines[2:])
     for words in ("s3 listen", "(5 s)", "none runs", "the link does not answer", "3 waiting"):
         assert words in rest
-    four = status.text(home, Status(agents, None, "hazard", True, 0, "hazard_cloud"), NOW)
+    four = status.text(home, Status(agents, None, "hazard", True, 0, {"hazard": "1.2.0"}, "hazard_cloud"), NOW)
     assert "RApp        hazard\ncloud agent hazard_cloud" in four
+    assert "installed   hazard 1.2.0\n" in four
     assert "./rapp up" in status.text(home, Status([], None, None, None, 0), NOW)

@@ -5,7 +5,7 @@ import asyncio
 import json
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from rapp_cli.home import platform
@@ -14,6 +14,7 @@ from rapp_cli.home.place import Home, add_home_option, home_of
 from rapp_cli.home.supervisor import Process, Supervisor, process_state
 from rapp_cli.timeline import Entry, latest
 from rapp_hop.errors import Invalid
+from rapp_hop.hz.install import RappFolder
 from rapp_link.letter import from_json
 
 ALL_RUN, SOMETHING_DOES_NOT, NOTHING_IS_UP = 0, 1, 3
@@ -39,6 +40,7 @@ class Status:
     rapp: str | None  # name of the RApp that runs
     registered: bool | None  # with the platform; None: not known, as the link or the rosbridge does not answer
     mails_waiting: int
+    installed: Mapping[str, str] = field(default_factory=dict)  # versions of the RApps on the robot
     cloud_agent: str | None = None  # name of its package, when the running RApp has one at the home's own platform
 
 
@@ -67,7 +69,8 @@ def read(home: Home, processes: Mapping[str, Process]) -> Status:
     running = core is not None and core.state in RUNS_A_RAPP
     registered = asyncio.run(platform.registered(home.settled().bridge, PATIENCE)) if processes else None
     rapp, agent = (_rapp(folder) if running else None for folder in (home.robot / "runs", home.cloud / "agents" / "runs"))
-    return Status(agents, core, rapp, registered, _waiting(home.robot), agent)
+    installed = {name: manifest.version.text for name, manifest in RappFolder(home.robot / "rapps").list().items()}
+    return Status(agents, core, rapp, registered, _waiting(home.robot), installed, agent)
 
 
 def _frozen(process: Process) -> Process:
@@ -121,6 +124,7 @@ def text(home: Home, status: Status, now: float) -> str:
         lines += [f"cloud agent {status.cloud_agent}"] if status.cloud_agent else []
         standing = {True: "registered", False: "not registered: it is away", None: "not known: the link does not answer"}
         lines += [f"platform    {standing[status.registered]}"]
+    lines += [f"installed   {', '.join(f'{name} {version}' for name, version in status.installed.items()) or 'no RApp'}"]
     return "\n".join([*lines, f"mails       {status.mails_waiting} waiting to be sent"])
 
 
