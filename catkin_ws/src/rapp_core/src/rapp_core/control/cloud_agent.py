@@ -1,13 +1,15 @@
 """The cloud agent of a four-agent RApp, as the core agent sees it (deliverable section 3.2): started, kept, stopped by the link."""
 
 import threading
+import time
 
 from rapp_core.config import Config
 from rapp_core.errors import CoreError, Refused, Unreachable
 from rapp_core.ports import Agent, Hop
 
 KEEP = 2.0  # s between two words to the link that the run lives
-STOPPING = 5.0  # s for the link to stop it; later the link and the platform do it by themselves
+STOPPING = 5.0  # s for the link to stop it
+TRIES, AGAIN = 10, 1.0  # to stop it, and s between them; later the link and the platform do it by themselves
 
 
 class CloudAgents:
@@ -114,8 +116,15 @@ class _Partner:
             self._hop.keep(run)
 
     def _stop(self) -> None:
-        try:
-            answer = self._hop.request("stop_cloud_agent", {"run": self.run.name}, STOPPING)
-            self._stopped = isinstance(answer, dict) and bool(answer.get("stopped"))
-        except CoreError as error:
-            self._stopped = error
+        """A link that is away is asked again when nobody waits for it any more, so that the agent does not live on for long."""
+        for _ in range(TRIES):
+            try:
+                answer = self._hop.request("stop_cloud_agent", {"run": self.run.name}, STOPPING)
+                self._stopped = isinstance(answer, dict) and bool(answer.get("stopped"))
+                return
+            except Unreachable as error:
+                self._stopped = error
+                time.sleep(AGAIN)
+            except CoreError as error:
+                self._stopped = error
+                return
