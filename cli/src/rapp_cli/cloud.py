@@ -38,14 +38,20 @@ def own_cloud(data: Path, port: int, robot: str) -> Cloud:
 
 def foreign_cloud(url: str, env: Mapping[str, str]) -> Cloud:
     """A platform that runs already; raises UsageError when its address or what it gave this robot is missing."""
-    parts = urlsplit(url)
-    if parts.scheme != "https" and (parts.scheme != "http" or parts.hostname not in LOOPBACK):
-        raise UsageError(f"cannot use {url!r} as a platform: give a URL such as https://rapp.example:9001")
+    check_url(url)
     ca_file = Path(env["RAPP_CLOUD_CA_FILE"]).absolute() if env.get("RAPP_CLOUD_CA_FILE") else None
     try:
         return Cloud(url, Path(env["RAPP_TOKEN_FILE"]).absolute(), Path(env["RAPP_ROOT_FILE"]).absolute(), ca_file)
     except KeyError as error:
-        raise UsageError(f"cannot use {url} without {error}: set it to the file the platform gave this robot") from None
+        raise UsageError(f"cannot use {url} without {error}: ./rapp join, or set it to the file the platform gave") from None
+
+
+def check_url(url: str) -> str:
+    """Return a platform's URL; raises UsageError when it is none, or would send a token in the clear."""
+    parts = urlsplit(url)
+    if parts.scheme != "https" and (parts.scheme != "http" or parts.hostname not in LOOPBACK):
+        raise UsageError(f"cannot use {url!r} as a platform: give a URL such as https://rapp.example:9001")
+    return url
 
 
 def make_platform(data: Path, robot: str) -> None:

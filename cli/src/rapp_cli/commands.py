@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rapp_cli import bench, runs, sim, test
 from rapp_cli.demo import command as demo
-from rapp_cli.home import down, listen, log, say, status, up
+from rapp_cli.home import down, join, listen, log, say, status, up
 from rapp_cli.hz import command as hz
 from rapp_cli.store import command as store
 from rapp_cli.store import keys, new, publish, trial
@@ -26,6 +26,7 @@ class Command:
 COMMANDS = (
     Command("demo", "run a story end to end: voice-mail, show-around or hazard", demo.add_options, demo.run),
     Command("up", "start a robot and a cloud that keep running", up.add_options, up.run),
+    Command("join", "become a robot of a platform, by a one-time code", join.add_options, join.run),
     Command("say", "speak to the simulated robot, and see what it does", say.add_options, say.run),
     Command("listen", "speak to it by this computer's microphone", listen.add_options, listen.run),
     Command("status", "show every agent, its state and since when", status.add_options, status.run),

@@ -19,7 +19,7 @@ def noted(mount: Mount, memory: Memory) -> Mount:
     async def handler(visit: Visit) -> WireAnswer:
         answer = await mount.handler(visit)
         name = memory.accounts.name_of(token_of(visit.request.headers))
-        if name is not None and answer.status == 200 and visit.request.method == "GET":
+        if name is not None and answer.status in (200, 206) and visit.request.method == "GET":
             memory.audit.note(name, "download", visit.rest)
         return answer
 

@@ -1,6 +1,7 @@
 """Accounts, tokens, codes and passwords, on both databases; and at the platform's port."""
 
 import hashlib
+import io
 import json
 import os
 import subprocess
@@ -17,6 +18,10 @@ import sqlalchemy as sa
 
 from fakes.cloud_process import CloudProcess, cloud_process
 from fakes.packages import source_folder
+from rapp_cli.__main__ import main as rapp
+from rapp_cli.home.agents import environment
+from rapp_cli.home.place import Home, Settings
+from rapp_cli.home.ports import USUAL
 from rapp_cloud.accounts import Accounts
 from rapp_cloud.admission import LOGIN, Admission
 from rapp_cloud.database import tables
@@ -222,6 +227,28 @@ def test_a_robot_joins_and_works_and_is_thrown_out(cloud: CloudProcess) -> None:
     assert _command(cloud, "revoke", listed.split()[0]) == "1 revoked"
     _seen(cloud, token, 401)
     assert token not in cloud.log.read_text()
+
+
+def test_rapp_join_brings_token_and_root(
+    cloud: CloudProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    url, code = f"http://127.0.0.1:{cloud.port}", _command(cloud, "invite", "r3")
+    words = ["join", url, "--home", str(tmp_path / "home")]
+    monkeypatch.setattr("sys.stdin", io.StringIO(code[:-1] + ("0" if code[-1] != "0" else "1")))
+    assert rapp(words) == 2
+    assert "cannot trust this platform" in capsys.readouterr().err
+    monkeypatch.setattr("sys.stdin", io.StringIO(code + "\n"))
+    assert rapp(words) == 0
+    joined = tmp_path / "home" / "joined"
+    token = (joined / "token").read_text()
+    assert (joined / "token").stat().st_mode & 0o777 == 0o600
+    assert (joined / "root.json").read_bytes() == (cloud.data / "root.json").read_bytes()
+    assert _post(cloud, "/hop/register", {"kind": "nao", "api_version": "1.0"}, token)[0] == 200
+    monkeypatch.setattr("sys.stdin", io.StringIO(code))
+    assert rapp(words) == 1
+    settings = Settings("r3", None, url, None, (), dict(USUAL))
+    found = environment(Home(tmp_path / "home"), settings, {})
+    assert (found["RAPP_CLOUD"], found["RAPP_TOKEN_FILE"]) == (url, str(joined / "token"))
 
 
 @pytest.mark.parametrize("value", [{}, [], {"code": 3}, {"code": "x", "more": 1}, "x"])

@@ -51,7 +51,7 @@ def environment(home: Home, settings: Settings, env: Mapping[str, str]) -> dict[
     if settings.cloud is None:
         cloud = own_cloud(home.cloud, settings.ports["cloud"], settings.name)
     else:
-        cloud = foreign_cloud(settings.cloud, env)
+        cloud = foreign_cloud(settings.cloud, {**_joined(home), **env})
     account = settings.mail
     if account is None:
         account = MailAccount("127.0.0.1", settings.ports["mail"], "", "none", None, f"{settings.name}@home.example")
@@ -64,6 +64,11 @@ def environment(home: Home, settings: Settings, env: Mapping[str, str]) -> dict[
         "RAPP_ROBOT_NAME": settings.name,
         **link_environment(cloud, account),
     }
+
+
+def _joined(home: Home) -> dict[str, str]:
+    files = {"RAPP_TOKEN_FILE": home.joined / "token", "RAPP_ROOT_FILE": home.joined / "root.json"}
+    return {name: str(file) for name, file in files.items() if file.exists()}
 
 
 def _module(name: str, module: str, *words: str) -> Agent:

@@ -61,6 +61,11 @@ class Home:
         return self.folder / "cloud"
 
     @property
+    def joined(self) -> Path:
+        """What `./rapp join` has brought from a platform: token and trusted root."""
+        return self.folder / "joined"
+
+    @property
     def maildir(self) -> Path:
         """Where the home's own mail server delivers."""
         return self.folder / "mail"
