@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rapp_cli import bench, runs, sim, test
+from rapp_cli import administer, bench, runs, sim, test
 from rapp_cli.demo import command as demo
 from rapp_cli.home import down, join, listen, log, say, status, up
 from rapp_cli.hz import command as hz
@@ -33,6 +33,7 @@ COMMANDS = (
     Command("log", "show what the agents write, and follow it", log.add_options, log.run),
     Command("trace", "draw the last run as a UML sequence diagram", trace.add_options, trace.run),
     Command("runs", "show what robots have run, how long, what failed", runs.add_options, runs.run),
+    Command("cloud", "back up and restore a platform; its accounts, tokens, audit log", administer.add_options, administer.run),
     Command("down", "end them", down.add_options, down.run),
     Command("new", "make a RApp to begin with", new.add_options, new.run),
     Command("run", "try a RApp on a simulated robot", trial.add_options, trial.run),

@@ -14,6 +14,7 @@ import sqlalchemy as sa
 
 from fakes import postgres as pg
 from fakes.packages import source_folder
+from rapp_cli.__main__ import main as rapp
 from rapp_cloud.app import open_shelf
 from rapp_cloud.backup import KEPT, back_up, restore
 from rapp_cloud.catalogue import RobotKind
@@ -107,6 +108,17 @@ def test_the_commands(tmp_path: Path) -> None:
     nothing = _command("backup", "--data", str(tmp_path / "nothing"), str(tmp_path / "x"))
     assert nothing.returncode == 1
     assert "init" in nothing.stderr
+
+
+def test_rapp_cloud_backs_up_and_restores(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data, again, file = tmp_path / "cloud", tmp_path / "again", tmp_path / "backup"
+    _platform(data, None, tmp_path)
+    assert rapp(["cloud", "--data", str(data), "backup", str(file)]) == 0
+    assert rapp(["cloud", "--data", str(again), "restore", str(file)]) == 0
+    assert _content(again, None) == _content(data, None)
+    capsys.readouterr()
+    assert rapp(["cloud", "--data", str(again), "audit", "--check"]) == 0
+    assert capsys.readouterr().out == "1 entries, all as they were written\n"
 
 
 def test_a_database_that_is_not_empty_is_left_alone(database_url: str, tmp_path: Path) -> None:
