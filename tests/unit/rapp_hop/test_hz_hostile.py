@@ -205,7 +205,7 @@ def test_p21_pax_headers_negative_sizes_and_far_times(robot: Robot) -> None:
     assert (robot.target / "x").stat().st_mtime < 4e9
 
 
-@pytest.mark.parametrize("data", [b"", b"<html>404</html>", gzip.compress(b"no tar" * 200), zlib.compress(b"x" * 600)])
+@pytest.mark.parametrize("data", [b"", b"<html>404</html>", gzip.compress(b"no tar" * 200, mtime=0), zlib.compress(b"x" * 600)])
 def test_p22_not_a_tar(robot: Robot, data: bytes) -> None:
     robot.refuses(data, "cannot unpack")
 
