@@ -111,6 +111,7 @@ class HazardDetection(DynamicAgent):
     def _find_itself(self, share: Subsystem) -> None:
         share.memory["away"] = False
         sights: dict[str, Sight] = {}
+        navigation.take_predefined_posture("StandInit")
         try:
             for turn, yaws, pitch in SWEEPS:
                 if len(sights) < NEEDED:
