@@ -610,11 +610,11 @@ def test_a_robot_that_cannot_be_let_rest_does_not_keep_the_core_agent(home: Home
 BACK = "The new version did not start, the one before is back"
 
 
-def update(home: Home) -> None:
+def update(home: Home, **rapp: Any) -> None:
     """The platform offers clock 2.0.0; 1.0.0 has run here."""
     old = install_rapp(home.config.home, "clock", keywords=("what time is it",))
     home.link.catalogue[0]["version"] = "2.0.0"
-    new = write_rapp(old.parent / "2.0.0", "clock", version="2.0.0", keywords=("what time is it",))
+    new = write_rapp(old.parent / "2.0.0", "clock", version="2.0.0", keywords=("what time is it",), **rapp)
     home.link.answers["started"] = {"back": "1.0.0"}
 
     def install(_arguments: object) -> dict[str, Any]:
@@ -672,3 +672,16 @@ def test_when_an_update_is_not_to_be_trusted_nothing_runs(home: Home) -> None:
     home.round()
     assert home.fake.said() == ["I refuse to install clock, it is older than what I had"]
     assert home.agents.runs == []
+
+
+def test_a_new_version_is_not_blamed_for_a_platform_that_cannot_start_its_part_in_the_cloud(home: Home) -> None:
+    def initialising(agent: FakeAgent) -> None:
+        agent._told({"type": "state", "machine": "dynamic", "state": "s2", "kind": "entered", "detail": ""})
+
+    home.link.errors["start_cloud_agent"] = Refused("cannot start clock_cloud: the platform is full")
+    home.link.answers["stop_cloud_agent"] = {"stopped": False}
+    home.agents.script = Script(terminate=0.3, outcome=("failed", "no cloud agent"), acts=[(0.2, initialising)])
+    update(home, partner="clock_cloud")
+    home.round()
+    assert home.fake.said() == ["I cannot start its part in the cloud"]
+    assert "started" not in home.link.names()

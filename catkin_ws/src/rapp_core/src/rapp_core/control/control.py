@@ -201,7 +201,8 @@ class Control:
         if outcome is not None and outcome[0] != "done":
             share.memory["problem"] = "It has failed"
             _log.warning("the dynamic agent failed: %s", outcome[1])
-            self._trial.failed(outcome[1])
+            if self._parts.cloud_agents.problem() is None:
+                self._trial.failed(outcome[1])
         self._look_at_cloud_agent(share)
         return outcome is not None or share.memory["problem"] is not None or self._parts.stop.is_set()
 
