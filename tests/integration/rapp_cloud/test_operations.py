@@ -32,6 +32,13 @@ def cloud(tmp_path: Path) -> Iterator[CloudProcess]:
         yield cloud
 
 
+@pytest.fixture(scope="module")
+def steady(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CloudProcess]:
+    """One for the tests that leave it as it was."""
+    with cloud_process(tmp_path_factory.mktemp("steady"), []) as cloud:
+        yield cloud
+
+
 def _get(cloud: CloudProcess, path: str, **headers: str) -> tuple[int, str]:
     request = urllib.request.Request(f"http://127.0.0.1:{cloud.port}{path}", headers=headers)
     try:
@@ -49,7 +56,7 @@ async def _until(true: Callable[[], Awaitable[bool]]) -> None:
         await asyncio.sleep(0.05)
 
 
-def test_health_and_metrics(cloud: CloudProcess) -> None:
+def test_health_and_metrics(steady: CloudProcess) -> None:
     async def robot(nao: HopClient, other: HopClient) -> None:
         await nao.call("heartbeat")
         with pytest.raises(HopError):
@@ -57,11 +64,11 @@ def test_health_and_metrics(cloud: CloudProcess) -> None:
         with pytest.raises(HopError):
             await nao.call("nothing_of_ours")
 
-    cloud.run(robot)
-    assert _get(cloud, "/healthz") == (200, '{"alive": true}')
-    assert _get(cloud, "/readyz") == (200, '{"ready": true, "reasons": []}')
-    assert _get(cloud, "/healthz/x")[0] == 404
-    status, text = _get(cloud, "/metrics")
+    steady.run(robot)
+    assert _get(steady, "/healthz") == (200, '{"alive": true}')
+    assert _get(steady, "/readyz") == (200, '{"ready": true, "reasons": []}')
+    assert _get(steady, "/healthz/x")[0] == 404
+    status, text = _get(steady, "/metrics")
     assert status == 200
     lines = text.splitlines()
     assert 'rapp_calls_total{service="heartbeat",status="200"} 1.0' in lines
@@ -72,18 +79,18 @@ def test_health_and_metrics(cloud: CloudProcess) -> None:
     assert "nothing_of_ours" not in text
 
 
-def test_metrics_are_not_for_everybody(cloud: CloudProcess) -> None:
-    token = (cloud.data / "robots" / "nao.token").read_text()
+def test_metrics_are_not_for_everybody(steady: CloudProcess) -> None:
+    token = (steady.data / "robots" / "nao.token").read_text()
     proxied = {"X-Forwarded-For": "192.0.2.1"}
-    assert _get(cloud, "/metrics", **proxied)[0] == 401
-    assert _get(cloud, "/metrics", **proxied, **{"Accept-Token": "x" * 43})[0] == 401
-    assert _get(cloud, "/metrics", **proxied, **{"Accept-Token": token})[0] == 200
-    assert _get(cloud, "/healthz", **proxied)[0] == 200
+    assert _get(steady, "/metrics", **proxied)[0] == 401
+    assert _get(steady, "/metrics", **proxied, **{"Accept-Token": "x" * 43})[0] == 401
+    assert _get(steady, "/metrics", **proxied, **{"Accept-Token": token})[0] == 200
+    assert _get(steady, "/healthz", **proxied)[0] == 200
 
 
-def test_o01_a_locked_database_holds_up_nobody_else(cloud: CloudProcess) -> None:
+def test_o01_a_locked_database_holds_up_nobody_else(steady: CloudProcess) -> None:
     async def test(nao: HopClient, _other: HopClient) -> None:
-        lock = sqlite3.connect(cloud.data / FILE, isolation_level=None)
+        lock = sqlite3.connect(steady.data / FILE, isolation_level=None)
         lock.execute("BEGIN IMMEDIATE")
         waiting = asyncio.create_task(nao.call("report", {"run": {"run": "r-1"}}, timeout=PATIENCE))
         assert (await nao.call("heartbeat"))["registered"]
@@ -91,18 +98,18 @@ def test_o01_a_locked_database_holds_up_nobody_else(cloud: CloudProcess) -> None
         assert not waiting.done()
         with pytest.raises(Unreachable, match="try again later"):
             await waiting
-        status, text = await asyncio.to_thread(_get, cloud, "/readyz")
+        status, text = await asyncio.to_thread(_get, steady, "/readyz")
         assert (status, json.loads(text)["ready"]) == (503, False)
         assert "database" in text
         lock.close()
 
         async def ready() -> bool:
-            return (await asyncio.to_thread(_get, cloud, "/readyz"))[0] == 200
+            return (await asyncio.to_thread(_get, steady, "/readyz"))[0] == 200
 
         await _until(ready)
         assert await nao.call("report", {"run": {"run": "r-1"}}, timeout=PATIENCE) == {"kept": True}
 
-    cloud.run(test)
+    steady.run(test)
 
 
 def test_o01_a_damaged_database_is_said_at_start(cloud: CloudProcess) -> None:
@@ -215,14 +222,14 @@ def test_o06_sigterm_under_load_drains(cloud: CloudProcess) -> None:
         assert {run["run"] for run in memory.reports.of("nao")} >= set(kept)
 
 
-def test_o08_metrics_scraped_all_the_time(cloud: CloudProcess) -> None:
+def test_o08_metrics_scraped_all_the_time(steady: CloudProcess) -> None:
     async def test(nao: HopClient, _other: HopClient) -> None:
-        scrapes = [asyncio.create_task(asyncio.to_thread(_get, cloud, "/metrics")) for _ in range(300)]
+        scrapes = [asyncio.create_task(asyncio.to_thread(_get, steady, "/metrics")) for _ in range(300)]
         for _ in range(20):
             assert (await nao.call("heartbeat"))["registered"]
         assert {status for status, _ in await asyncio.gather(*scrapes)} == {200}
 
-    cloud.run(test)
+    steady.run(test)
 
 
 def test_o08_an_answer_is_made_once_for_all_who_ask() -> None:
