@@ -36,9 +36,24 @@ def composition() -> Iterator[Composition]:
 
 def say(composition: Composition, robot: str, *words: str) -> str:
     """Somebody in the robot's room says one thing after another; gives what was shown, once the robot listens again."""
-    said = composition.inside(robot, "./rapp", "say", *words, "--home", "/robot", timeout=180)
+    said = composition.inside(robot, "./rapp", "say", *words, "--home", "/robot", "--timeout", "400", timeout=420)
     assert said.returncode == 0, f"{said.stdout}\n{said.stderr}\n{composition.logs()}"
     return said.stdout
+
+
+def on_both(composition: Composition, *words: str) -> dict[str, str]:
+    """The same is said to both robots at once."""
+    told: dict[str, str] = {}
+
+    def on(robot: str) -> None:
+        told[robot] = say(composition, robot, *words)
+
+    people = [threading.Thread(target=on, args=(robot,)) for robot in ROBOTS]
+    for person in people:
+        person.start()
+    for person in people:
+        person.join()
+    return told
 
 
 def mails(composition: Composition, folder: Path) -> list[Message]:
@@ -77,20 +92,20 @@ def test_the_robots_reach_the_platform_and_not_each_other(composition: Compositi
 
 
 def test_voice_mail_on_both_robots_at_once(composition: Composition, tmp_path: Path) -> None:
-    told: dict[str, str] = {}
-
-    def on(robot: str) -> None:
-        told[robot] = say(composition, robot, "e-mail", "Elizabeth", f"this is for {robot}")
-
-    people = [threading.Thread(target=on, args=(robot,)) for robot in ROBOTS]
-    for person in people:
-        person.start()
-    for person in people:
-        person.join()
+    told = on_both(composition, "e-mail", "Elizabeth", "please bring some water")
     assert all("your message to Elizabeth is sent" in told.get(robot, "") for robot in ROBOTS), told
     found = mails(composition, tmp_path / "mails")
     assert subjects(found) == ["nao1@home.example", "nao2@home.example"]
     assert all(any(part.get_filename("").endswith(".ogg") for part in message.walk()) for message in found)
+
+
+def test_hazard_detection_on_both_robots_at_once(composition: Composition) -> None:
+    told = on_both(composition, "is everything safe", "no")
+    for robot in ROBOTS:
+        shown = told.get(robot, "")
+        assert "the door is open" in shown, shown
+        assert "the lamp is on" in shown, shown
+        assert "I write to nobody" in shown, shown
 
 
 def test_a_robot_cut_off_in_the_middle_keeps_its_mail_and_sends_it_once_healed(composition: Composition, tmp_path: Path) -> None:
