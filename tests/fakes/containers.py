@@ -8,25 +8,29 @@ import subprocess
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
+
+import pytest
 
 from rapp_cli.paths import ROOT
 
 COMPOSE_FILE = ROOT / "docker" / "compose.yaml"
-ENGINE = ROOT.parent / "shared" / "tools" / "container-engine"
+ENGINE = Path("shared/tools/container-engine")  # in a folder above the repository; starts an engine where none runs
 STEP = 0.5  # s between two looks
 
 
 def engine_environment() -> dict[str, str]:
-    """The environment in which `docker` reaches an engine; starts one where there is the means. Fails when there is none."""
+    """The environment in which `docker` reaches an engine; starts one where there is the means, else skips the test."""
     env = dict(os.environ)
     if shutil.which("docker") and _engine_answers(env):
         return env
-    assert ENGINE.exists(), "no Docker engine answers: start one, and set DOCKER_HOST to it"
-    up = subprocess.run([str(ENGINE), "up"], capture_output=True, text=True, timeout=600, check=False)
-    assert up.returncode == 0, up.stderr
+    script = next((folder / ENGINE for folder in ROOT.parents if (folder / ENGINE).exists()), None)
+    if script is None:
+        pytest.skip("no Docker engine answers here: start one, and set DOCKER_HOST to it")
+    up = subprocess.run([str(script), "up"], capture_output=True, text=True, timeout=600, check=False)
     env["DOCKER_HOST"] = up.stdout.partition("DOCKER_HOST=")[2].strip()
-    assert _engine_answers(env), up.stderr
+    assert _engine_answers(env), f"{up.stdout}\n{up.stderr}"
     return env
 
 

@@ -15,7 +15,7 @@ import pytest
 
 from fakes.containers import Composition, engine_environment
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.system, pytest.mark.timeout(1500)]
 ROBOTS = ("nao1", "nao2")
 SERVICES = ("cloud", "mail", *ROBOTS)
 REACHES = "import socket, sys; socket.create_connection((sys.argv[1], int(sys.argv[2])), 3)"
