@@ -14,6 +14,10 @@ def test_feels_a_robot_that_stands_in_free_space(driver):
     assert not senses.fallen
 
 
+def test_feels_no_hand_where_there_is_none(driver):
+    assert driver.robot.feeling.touched() is False
+
+
 def test_feels_again_after_it_was_closed(driver):
     driver.robot.feeling.close()
     driver.robot.feeling.close()

@@ -177,6 +177,7 @@ class FakeFeeling:
         self._body = body
         self._motion = motion
         self.asked = 0
+        self.hand = False  # on its head
         self.now = Senses({}, (math.inf, math.inf), (False, False), 0.9, Pose2D(0.0, 0.0, 0.0), fallen=False)
 
     def feel(self, **changes: object) -> None:
@@ -186,6 +187,9 @@ class FakeFeeling:
         self._body.note("")
         self.asked += 1
         return replace(self.now, joints=dict(self._motion.angle))
+
+    def touched(self) -> bool:
+        return self.hand
 
     def close(self) -> None:
         """Nothing to do."""

@@ -24,6 +24,7 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 SILENT = 1.0  # s without heartbeat after which a lease is silent
 STOPPED = 0.3  # s from then on within which motion has stopped
+FELT = 0.2  # s until a touch is felt
 GUARDED = 1.0  # s from the core agent's end to a still robot
 BUSY = 1.0  # s that a busy machine may add: three processes have to get their turns
 SETTINGS = f"""
@@ -87,6 +88,7 @@ for _ in range(40):
     wheels.publish(message)
     self.pause(0.05)"""
 RISES = "from rapp_api import navigation\nnavigation.take_predefined_posture('StandInit', 1.0)"
+STOPPED_BY_HAND = "You have stopped it"
 REFUSED = "It has failed"  # so says the robot when the RApp may not even publish
 
 took: dict[str, tuple[float, float]] = {}
@@ -239,6 +241,17 @@ def test_a_rapp_that_stands_still_in_a_walk_is_stopped(robot: WholeRobot) -> Non
         robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "It does not answer any more"), since)
         until_resting(robot)
     check("RApp stands still, move_vel", watch.went_on(KINDS["move_vel"], frozen.time), SILENT + STOPPED)
+    robot.until_only_the_spare_runs()
+
+
+def test_l11_a_hand_on_its_head_stops_a_rapp_in_the_middle_of_a_walk(robot: WholeRobot) -> None:
+    since = len(robot.seen)
+    with watched(robot) as watch:
+        touched = in_the_middle(robot, watch, "move_to")
+        robot.room("touch", "MiddleTactil", 0.3)
+        robot.until(lambda seen: (seen.kind, seen.detail) == ("said", STOPPED_BY_HAND), since)
+        until_resting(robot)
+    check("head touched, move_to", watch.went_on(KINDS["move_to"], touched.time), FELT + STOPPED)
     robot.until_only_the_spare_runs()
 
 

@@ -474,6 +474,16 @@ def test_a_rapp_that_fails(home: Home) -> None:
     assert "dismantle" in home.fake.journal
 
 
+def test_a_hand_on_its_head_stops_a_rapp(home: Home) -> None:
+    home.agents.script = Script(terminate=None)
+    home.start()
+    ask(home)
+    home.step_until(lambda: home.machine.state == "s9")
+    home.fake.robot.feeling.hand = True
+    assert home.control._touch._felt.wait(5)
+    assert failing_round(home) == (BROKEN, ["You have stopped it"])
+
+
 @pytest.mark.parametrize(
     ("script", "words", "bound"),
     [

@@ -129,6 +129,9 @@ class Feeling(Protocol):
     def senses(self) -> Senses:
         """What the body feels now. Raises Refused, Unreachable."""
 
+    def touched(self) -> bool:
+        """Whether a hand lies on the middle of its head, which is how people stop it. Raises Refused, Unreachable."""
+
     def close(self) -> None:
         """Let the sonars be quiet; the next `senses` wakes them. No error when the robot is away."""
 

@@ -15,8 +15,9 @@ from rapp_core.control.listening import Listener
 from rapp_core.control.platform import Platform
 from rapp_core.control.question import which
 from rapp_core.control.refusals import not_installed, not_interpreted, not_started
+from rapp_core.control.touch import Touch
 from rapp_core.control.trial import Trial
-from rapp_core.control.words import NONE_OF_THEM, NOT_UNDERSTOOD, READY, READY_ALONE
+from rapp_core.control.words import NONE_OF_THEM, NOT_UNDERSTOOD, READY, READY_ALONE, STOPPED
 from rapp_core.errors import CoreError, Invalid, Refused, Unreachable
 from rapp_core.launcher.lease import Lease
 from rapp_core.ports import Agent, Agents, Hop, Robot
@@ -55,6 +56,7 @@ class Control:
         self._listener = Listener(parts.robot, parts.config, parts.now)
         self._recording = parts.config.home / "listening" / "command.ogg"
         self._trial = Trial(parts.hop, parts.trace)
+        self._touch = Touch(parts.robot.feeling)
         self._run: Agent | None = None
 
     # s1, s2: initialise, register
@@ -160,6 +162,7 @@ class Control:
                 self._end_trial(share)
             return
         parts.lease.grant(self._run)
+        self._touch.begin()
         parts.cloud_agents.begin(self._run)
         share.memory["until"] = parts.now() + parts.config.first_word
 
@@ -174,6 +177,7 @@ class Control:
             self._trial.failed(run.outcome[1] if run.outcome is not None else "no first word")
             share.memory["problem"] = "It did not start"
         self._look_at_cloud_agent(share)
+        self._heed_touch(share)
 
     def first_word_or_over(self, share: Subsystem) -> bool:
         """Whether it has spoken, or never will."""
@@ -189,6 +193,11 @@ class Control:
                 _log.warning("run %s: %s", run.name, problem)
                 self._trial.failed(problem)
                 share.memory["problem"] = problem
+            self._heed_touch(share)
+
+    def _heed_touch(self, share: Subsystem) -> None:
+        if self._touch.felt:
+            share.memory["problem"] = STOPPED
 
     def _look_at_cloud_agent(self, share: Subsystem) -> None:
         error = self._parts.cloud_agents.problem()
@@ -243,6 +252,7 @@ class Control:
             _log.warning("%s; the platform stops it with the robot's lease", error)
 
     def _end_run(self) -> None:
+        self._touch.end()
         run, parts = self._present(), self._parts
         keep = parts.launcher.log_of(run.manifest) if run.manifest is not None else None
         run.end(parts.config.terminate, keep)

@@ -15,6 +15,7 @@ PRECISION = 0.0
 FARTHEST = 5.0  # m, what NAOqi gives when no echo comes
 LYING = 0.9  # rad that the torso leans when the robot has fallen, or cannot stay on its feet
 PLACE = "Device/SubDeviceList/{}/Sensor/Value"
+HEAD = PLACE.format("Head/Touch/Middle")
 KEYS = [
     PLACE.format(part)
     for part in (
@@ -54,6 +55,10 @@ class NaoqiFeeling:
     def _ask(self, module: str, method: str, *args: Any) -> Callable[[], Any]:
         future = self._connection.start(module, method, *args)
         return lambda: self._connection.result(future, module, method)
+
+    def touched(self) -> bool:
+        """See `body_ports.Feeling`."""
+        return bool(self._connection.call("ALMemory", "getData", HEAD))
 
     def close(self) -> None:
         """See `body_ports.Feeling`."""
