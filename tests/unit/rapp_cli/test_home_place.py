@@ -37,8 +37,8 @@ def test_commands_name_the_home_only_when_it_is_not_the_default() -> None:
     assert Home(Path("/a b")).command("down") == "./rapp down --home '/a b'"
 
 
-def test_the_folders_are_for_the_user_alone(tmp_path: Path) -> None:
-    home = Home(tmp_path / "home")
+def test_the_folders_are_for_the_user_alone(tmp_path_factory: pytest.TempPathFactory) -> None:
+    home = Home(tmp_path_factory.mktemp("user") / "home")
     home.make()
     assert (home.folder.stat().st_mode & 0o777, home.supervision.stat().st_mode & 0o777) == (0o700, 0o700)
 
