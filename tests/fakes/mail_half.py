@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rapp_hop.client import HopClient
 from rapp_hop.errors import HopError
+from rapp_link.agents import CloudAgents
 from rapp_link.cloud_side import Platform
 from rapp_link.commands import Commands
 from rapp_link.config import Config, MailConfig
@@ -35,7 +36,8 @@ async def serve(home: Path, port: int) -> None:
     reports, outbox = Reports(home / "link" / "reports"), Outbox(home / "link" / "outbox", mail.waiting)
     postman = Postman(outbox, SmtpSender(mail), mail)
     platform = Platform(HopClient(config.cloud), config, reports)
-    office = Office(JobTable(config.jobs, config.longest), Commands(config, platform, None, outbox, postman, reports).table(), tell)
+    commands = Commands(config, platform, None, outbox, postman, reports, CloudAgents(platform)).table()
+    office = Office(JobTable(config.jobs, config.longest), commands, tell)
     working = asyncio.create_task(postman.run())
     lines = asyncio.StreamReader()
     await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
