@@ -5,9 +5,6 @@ In each a witness, connected before, is served afterwards as ever.
 
 import asyncio
 import json
-import xmlrpc.client
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +12,7 @@ import pytest
 
 from fakes.bridge_neighbours import PATIENCE, Peer
 from fakes.bridge_wire import BINARY, CUT, PING, TurnedAwayError, Wire, framed
+from fakes.bridge_witness import known, served, told, witness
 
 MANY = 50  # names a client may hold
 STRING = "std_msgs/String"
@@ -25,35 +23,6 @@ def bridge(start_for_module: Any, peer: Peer) -> Any:
     limits = {"frame-limit": 100_000, "names": MANY, "queue-limit": 1_000_000, "linger": 0.5, "entry-timeout": 3, "call-timeout": 3}
     words = [str(word) for name, value in limits.items() for word in (f"--{name}", value)]
     return start_for_module("rapp_bridge", "--port", "0", *words)
-
-
-@asynccontextmanager
-async def witness(url: str) -> AsyncIterator[Wire]:
-    wire = await Wire.open(url)
-    await served(wire)
-    try:
-        yield wire
-        await served(wire)
-    finally:
-        wire.leave()
-
-
-async def served(wire: Wire) -> None:
-    wire.send(op="call_service", service="/say", args=["as ever"], id="witness")
-    while (answer := await wire.receive("service_response")).get("id") != "witness":
-        pass
-    assert answer["values"]["message"] == "as ever"
-
-
-async def told(wire: Wire, words: str = "cannot ") -> None:
-    """Wait for a status that says so, and see the connection served on."""
-    while words not in (await wire.receive("status"))["msg"]:
-        pass
-    await wire.settle()
-
-
-def known(master: str, name: str) -> bool:
-    return name in json.dumps(xmlrpc.client.ServerProxy(master).getSystemState("/test"))
 
 
 def test_w03_op_unknown_list_or_missing(url: str) -> None:

@@ -1,11 +1,7 @@
 """W01, W02 and W14 of the project's list of hostile inputs: before and beyond what a token opens (see `test_named_items`)."""
 
 import asyncio
-import json
 import ssl
-import xmlrpc.client
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +10,12 @@ import pytest
 from fakes.bridge_certificate import certificate
 from fakes.bridge_neighbours import Peer
 from fakes.bridge_wire import BINARY, Wire, framed
+from fakes.bridge_witness import known, told, witness
 
 TOKEN = "the-token-of-one-client"
 ACCESS = f'[clients.one]\ntoken = "{TOKEN}"\ntopics = ["/one/*", "/latched"]\nservices = ["/say"]\n'
 STRING = "std_msgs/String"
+PASS = {"Authorization": f"Bearer {TOKEN}"}
 ACT = framed(b'{"op":"advertise","topic":"/one/must_not_be","type":"std_msgs/String"}')
 
 
@@ -40,38 +38,9 @@ def tls(pem: tuple[Path, Path]) -> ssl.SSLContext:
     return ssl.create_default_context(cafile=str(pem[0]))
 
 
-@asynccontextmanager
-async def witness(url: str, tls: ssl.SSLContext) -> AsyncIterator[Wire]:
-    wire = await Wire.open(url, {"Authorization": f"Bearer {TOKEN}"}, tls)
-    await served(wire)
-    try:
-        yield wire
-        await served(wire)
-    finally:
-        wire.leave()
-
-
-async def served(wire: Wire) -> None:
-    wire.send(op="call_service", service="/say", args=["as ever"], id="witness")
-    while (answer := await wire.receive("service_response")).get("id") != "witness":
-        pass
-    assert answer["values"]["message"] == "as ever"
-
-
-async def told(wire: Wire, words: str = "cannot ") -> None:
-    """Wait for a status that says so, and see the connection served on."""
-    while words not in (await wire.receive("status"))["msg"]:
-        pass
-    await wire.settle()
-
-
-def known(master: str, name: str) -> bool:
-    return name in json.dumps(xmlrpc.client.ServerProxy(master).getSystemState("/test"))
-
-
 def test_w01_a_frame_before_authentication(guarded: str, tls: ssl.SSLContext, roscore: str) -> None:
     async def story() -> None:
-        async with witness(guarded, tls):
+        async with witness(guarded, PASS, tls):
             wire = await Wire.open(guarded, None, tls)
             wire.raw(ACT)
             assert (await wire.ending())[:2] == (1008, "not authenticated")
@@ -85,7 +54,7 @@ def test_w02_frames_that_make_the_auth_parser_stumble(guarded: str, tls: ssl.SSL
     frames = [right + ACT[6:], right + b"x", b"[" + right + b"]", b'"auth"', b"1", b"", b"\xff", b'{"op":"auth"}']
 
     async def story() -> None:
-        async with witness(guarded, tls):
+        async with witness(guarded, PASS, tls):
             for frame in [*map(framed, frames), framed(b"\x00", BINARY), framed(b"\xa1\x62op\x64auth", BINARY)]:
                 wire = await Wire.open(guarded, None, tls)
                 wire.raw(frame + ACT)
@@ -97,7 +66,7 @@ def test_w02_frames_that_make_the_auth_parser_stumble(guarded: str, tls: ssl.SSL
 
 def test_w14_a_topic_that_the_token_does_not_open(guarded: str, tls: ssl.SSLContext, roscore: str) -> None:
     async def story() -> None:
-        async with witness(guarded, tls) as wire:
+        async with witness(guarded, PASS, tls) as wire:
             for topic in ("/other/x", "/one/../other/x", "/cmd_vel"):
                 wire.send(op="publish", topic=topic, type=STRING, msg={"data": "x"})
                 await told(wire)

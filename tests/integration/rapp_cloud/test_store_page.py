@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from selenium.webdriver import Chrome, ChromeOptions, ChromeService
+from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
+from fakes.browser import browser
 from fakes.packages import source_folder
 from rapp_cloud.shelf import Shelf
 from rapp_cloud.store_page import store_page
@@ -49,17 +50,10 @@ def address(shelf: Shelf, tmp_path: Path) -> Iterator[str]:
     loop.close()
 
 
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Chrome]:
-    options = ChromeOptions()
-    options.binary_location = "/usr/bin/chromium"
-    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", f"--user-data-dir={tmp_path / 'browser'}"):
-        options.add_argument(word)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    browser = Chrome(options=options, service=ChromeService("/usr/bin/chromedriver"))
-    browser.set_page_load_timeout(60)
-    yield browser
-    browser.quit()
+@pytest.fixture(name="browser")
+def running_browser(tmp_path: Path) -> Iterator[Chrome]:
+    with browser(tmp_path) as driver:
+        yield driver
 
 
 def put(shelf: Shelf, folder: Path, name: str, version: str = "1.0.0", publisher: str | None = None, **rapp: Any) -> None:

@@ -1,23 +1,20 @@
 """The page on which a person tries the services, in a real browser: Debian's chromium."""
 
 import asyncio
-import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from selenium.webdriver import Chrome, ChromeOptions
-from selenium.webdriver.chrome.service import Service as Driver
+from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.wait import WebDriverWait
 
+from fakes.browser import PATIENCE, browser
 from fakes.hop_house import TOKEN, house
 from rapp_hop.service import Service, service
-
-PATIENCE = 60  # s
 
 
 @service
@@ -52,24 +49,6 @@ def open_house(folder: Path, *more: Service) -> Iterator[int]:
     finally:
         end.set()
         thread.join(PATIENCE)
-
-
-@contextmanager
-def browser(folder: Path) -> Iterator[Chrome]:
-    """A browser without screen and network, whose files all lie in the folder."""
-    options = ChromeOptions()
-    options.binary_location = "/usr/bin/chromium"
-    words = ["--headless=new", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--disable-background-networking"]
-    words += [f"--user-data-dir={folder / 'browser'}", "--no-proxy-server", "--disable-extensions", "--disable-sync"]
-    for word in words + ["--no-sandbox"] * (os.geteuid() == 0):  # chromium's own sandbox refuses root
-        options.add_argument(word)
-    driver = Chrome(options, Driver("/usr/bin/chromedriver", log_output=str(folder / "chromedriver.log")))
-    try:
-        driver.set_page_load_timeout(PATIENCE)
-        driver.set_script_timeout(PATIENCE)
-        yield driver
-    finally:
-        driver.quit()
 
 
 class Page:
