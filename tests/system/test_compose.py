@@ -14,6 +14,7 @@ from typing import IO
 import pytest
 
 from fakes.containers import Composition, engine_environment
+from fakes.processes import ended
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(1500)]
 ROBOTS = ("nao1", "nao2")
@@ -153,4 +154,4 @@ def test_nothing_is_left_when_it_is_taken_down(composition: Composition) -> None
     processes = {composition.inspect(service)["State"]["Pid"] for service in SERVICES}
     composition.compose("down", "--volumes", "--timeout", "30", timeout=120)
     assert composition.left() == {"container": [], "volume": [], "network": []}
-    assert not [pid for pid in processes if Path(f"/proc/{pid}").exists()]
+    assert not [pid for pid in processes if not ended(pid)]

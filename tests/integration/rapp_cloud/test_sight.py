@@ -15,6 +15,7 @@ import pytest
 
 from fakes.cloud_process import CloudProcess, cloud_process
 from fakes.drawn_room import DoorScene, Image, draw_codes, draw_door, draw_lamp
+from fakes.processes import children, stat
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Invalid
 
@@ -164,14 +165,10 @@ def spent(cloud: CloudProcess) -> dict[int, float]:
     found = {}
     for pid in children(cloud._process.pid):
         if b"rapp_hop.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
-            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+            fields = stat(pid)
             found[pid] = (int(fields[11]) + int(fields[12])) / TICKS
     return found
 
 
 def more(before: dict[int, float], after: dict[int, float]) -> dict[int, float]:
     return {pid: seconds - before.get(pid, 0.0) for pid, seconds in after.items()}
-
-
-def children(pid: int) -> list[int]:
-    return [int(word) for task in Path(f"/proc/{pid}/task").iterdir() for word in (task / "children").read_text().split()]

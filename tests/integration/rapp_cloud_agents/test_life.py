@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from fakes.cloud_agents import PROBE, Workshop, call, in_workshop, until
+from fakes.processes import ended
 from fakes.whole_robot import processes_of
 from rapp_cloud.cloud_agents.confined import Confined
 from rapp_cloud.cloud_agents.orphans import clear
@@ -58,7 +59,7 @@ def test_a_sandbox_nobody_waits_for_any_more_leaves_nothing(tmp_path: Path) -> N
         starting.cancel()
         with pytest.raises(asyncio.CancelledError):
             await starting
-        await until(lambda: not Path(f"/proc/{int(child.read_text())}/cmdline").exists())
+        await until(lambda: ended(int(child.read_text())))
 
     asyncio.run(test())
 

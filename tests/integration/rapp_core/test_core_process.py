@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from fakes.processes import children, ended
 from fakes.rapps import install_rapp
 from rapp_core.robot.naoqi.connection import Connection
 
@@ -171,19 +172,10 @@ def test_it_ends_with_all_its_children_in_the_midst_of_a_run(watched, number):
     core.until_state("s3")
     say(core, "endless")
     core.until_state("s9")
-    pids = [int(folder.name) for folder in Path("/proc").glob("[0-9]*")]
-    children = [pid for pid in pids if _parent(pid) == core.core.process.pid]
-    assert children
+    running = children(core.core.process.pid)
+    assert running
     assert core.core.stop(number) == 0
-    assert [pid for pid in children if _parent(pid) is not None] == []
-
-
-def _parent(pid: int) -> int | None:
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return None
-    return None if fields[0] == "Z" else int(fields[1])
+    assert all(ended(pid) for pid in running)
 
 
 def test_without_a_master_it_waits_and_can_be_ended(ros_env, tmp_path):

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from fakes.processes import ended
 from rapp_core.gate.bounds import HEADER, REQUEST
 from rapp_core.launcher.run import Run
 from rapp_ros.master import ask
@@ -63,10 +64,6 @@ def core(ros_env: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> I
 
 def graph(roscore: str) -> str:
     return str(ask(roscore, PATIENCE, "getSystemState", "/test")[2])
-
-
-def gone(pid: int) -> bool:
-    return not Path(f"/proc/{pid}").exists()
 
 
 # what passes
@@ -321,7 +318,7 @@ def test_nothing_is_left_of_a_run_whatever_happens_to_its_gate(workshop, core, r
     if fault is not None:
         os.kill(run._gate.pid, fault)
     pids = ended_run(run)
-    assert all(gone(pid) for pid in pids)
+    assert all(ended(pid) for pid in pids)
     assert graph(roscore) == before
     assert not run.folders.root.exists()
 
@@ -343,7 +340,7 @@ def test_a_spare_whose_gate_has_failed_is_replaced(workshop, wait_for, fault):
     os.kill(spare._gate.pid, fault)
     wait_for(lambda: not spare.usable)
     assert workshop.finish(workshop.start("pass"))[1] == "done"
-    assert gone(spare._gate.pid)
+    assert ended(spare._gate.pid)
 
 
 def test_a_gate_has_no_rights_and_no_more_than_it_needs(workshop):

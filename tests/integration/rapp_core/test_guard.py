@@ -8,6 +8,7 @@ import numpy
 import pytest
 import soundfile
 
+from fakes.processes import children, ended
 from rapp_core.robot.naoqi.connection import Connection
 from rapp_core.robot.naoqi.guard import Guard, stop_robot
 
@@ -16,25 +17,6 @@ WITHIN = 5.0  # s of it that pass after the kill; a guard on a free machine need
 SIM = ("--microphone", "text", "--port", "0")
 SUBSCRIBER = "rapp_nao"
 LONG = "this is a very long text that the robot says, and it goes on and on, for much longer than anybody would want to listen"
-
-
-def children(parent):
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if fields[0] != "Z" and int(fields[1]) == parent:
-            found.append(int(folder.name))
-    return found
-
-
-def running(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def guard_of(core):
@@ -98,7 +80,7 @@ def test_the_robot_is_still_after_kill_9_and_the_next_core_agent_clears_up(robot
     assert yaw(robot) - killed_at < WITHIN / LONGEST  # the way that the head has made since
     wait_for(lambda: all(future.isFinished() for future in under_way.values()))
     assert robot.call("ALMotion", "getRobotVelocity") == pytest.approx([0.0, 0.0, 0.0], abs=0.01)
-    wait_for(lambda: not any(running(pid) for pid in old_processes))  # its guard and its sandboxes
+    wait_for(lambda: not any(not ended(pid) for pid in old_processes))  # its guard and its sandboxes
     assert robot.call("ALSonar", "getSubscribersInfo") == []
     assert robot.call("ALVideoDevice", "getSubscribers") == ["somebody_0"]
     assert soundfile.info(home / "left.ogg").frames > 0  # complete: the recording was ended
@@ -115,10 +97,10 @@ def test_a_guard_that_dies_is_started_again_and_ends_with_its_core_agent(robot, 
     with Guard(robot.url, SUBSCRIBER, home) as guard:
         first = guard.pid
         os.kill(first, signal.SIGKILL)
-        wait_for(lambda: guard.pid not in (first, None) and running(guard.pid))
+        wait_for(lambda: guard.pid not in (first, None) and not ended(guard.pid))
         second = guard.pid
-    assert not running(first)
-    assert not running(second)
+    assert ended(first)
+    assert ended(second)
 
 
 def test_an_orderly_end_leaves_the_robot_alone(robot, home, wait_for):
@@ -144,7 +126,7 @@ def test_two_guards_of_one_data_folder_do_not_overlap(robot, home):
         process, first._process = first._process, None  # as if its core agent were killed now
         process.stdin.close()
         with Guard(robot.url, SUBSCRIBER, home):
-            assert process.poll() is not None or not running(process.pid)
+            assert process.poll() is not None or ended(process.pid)
     assert process.wait(5) == 0
 
 

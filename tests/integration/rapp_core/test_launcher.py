@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from fakes.processes import ended
 from fakes.rapps import write_rapp
 from rapp_core.errors import Invalid, Refused
 from rapp_core.launcher import orphans
@@ -20,13 +21,6 @@ from rapp_core.launcher.run import Run
 from rapp_core.ros.services import offered
 
 FOREVER = "import time\nwhile True: time.sleep(0.05)"
-
-
-def gone(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except OSError:
-        return True
 
 
 def namespace(pid: int) -> Path | None:
@@ -84,7 +78,7 @@ def test_a_crash_is_seen_and_leaves_no_process(workshop, wait_for):
     wait_for(lambda: not run.alive)
     run.end(0.0)
     assert run.status == 7
-    assert gone(run._process.first)
+    assert ended(run._process.first)
 
 
 def test_an_error_in_the_rapp_is_its_outcome(workshop, wait_for):
@@ -118,7 +112,7 @@ while True: time.sleep(0.05)
     assert len(inside) >= 3  # bubblewrap's first process, the runner, the grandchild
     run.end(0.2)
     assert run.status == -signal.SIGKILL or run.status == 128 + signal.SIGKILL
-    wait_for(lambda: all(gone(pid) for pid in inside))
+    wait_for(lambda: all(ended(pid) for pid in inside))
 
 
 def test_sigterm_reaches_the_program_inside(workshop, wait_for):
@@ -146,7 +140,7 @@ def test_a_stopped_process_falls_silent(workshop, wait_for):
     threading.Event().wait(0.6)
     assert run.heartbeat - before < 0.3
     run.end(0.1)
-    assert all(gone(pid) for pid in inside)
+    assert all(ended(pid) for pid in inside)
 
 
 def test_sandboxes_end_when_the_core_agent_is_killed(workshop, tmp_path, wait_for):
@@ -171,7 +165,7 @@ time.sleep(60)
     process.kill()
     process.wait()
     process.stdout.close()
-    wait_for(lambda: all(gone(pid) for pid in pids))
+    wait_for(lambda: all(ended(pid) for pid in pids))
 
 
 def test_orphans_are_killed_and_their_folders_removed(tmp_path, wait_for):

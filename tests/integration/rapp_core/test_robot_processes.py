@@ -9,29 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from fakes.processes import children, ended
+
 SCRIPT = Path(__file__).parents[3] / "catkin_ws" / "src" / "rapp_core" / "scripts" / "robot"
 WORDS = ("--microphone", "text", "--voice", "silent", "--no-world")
 READY = 60.0  # s
-
-
-def running(pid):
-    """Whether a process runs; one that only waits to be reaped does not."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
-def children(parent):
-    pids = [int(folder.name) for folder in Path("/proc").glob("[0-9]*")]
-    return [pid for pid in pids if running(pid) and parent_of(pid) == parent]
-
-
-def parent_of(pid):
-    try:
-        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
-    except OSError:
-        return None
 
 
 @pytest.fixture
@@ -68,7 +50,7 @@ def test_starts_all_and_leaves_none(robot, tmp_path):
     assert grandchildren  # the spare's sandbox, at least
     robot.send_signal(signal.SIGTERM)
     assert robot.wait(30) == 0
-    assert [pid for pid in (*pids, *grandchildren) if running(pid)] == []
+    assert [pid for pid in (*pids, *grandchildren) if not ended(pid)] == []
     logs = {path.name for path in (tmp_path / "home" / "logs").glob("*.log")}
     assert logs >= {"roscore.log", "nao_sim.log", "rosbridge.log", "link.log", "core_agent.log"}
 
@@ -79,4 +61,4 @@ def test_when_one_process_ends_all_end_and_its_log_is_shown(robot):
     os.kill(pids[-1], signal.SIGKILL)
     assert robot.wait(30) == 1
     assert "so the robot ends" in robot.stderr.read()
-    assert [pid for pid in pids if running(pid)] == []
+    assert [pid for pid in pids if not ended(pid)] == []

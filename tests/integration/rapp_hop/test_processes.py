@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from fakes.processes import ended
 from rapp_hop.client import HopClient
 from rapp_hop.errors import HopError
 
@@ -66,14 +67,6 @@ async def all_pids(port: int, count: int) -> set[int]:
     return seen
 
 
-def gone(pid: int) -> bool:
-    """Whether a process has ended; one that waits to be reaped has."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except OSError:
-        return True
-
-
 def test_one_process(tmp_path: Path) -> None:
     with serving(tmp_path) as (process, ready):
         assert asyncio.run(callers_pids(ready["port"], 3)) == {process.pid}
@@ -90,7 +83,7 @@ def test_several_processes_share_the_port_and_one_that_dies_is_replaced(tmp_path
         later = asyncio.run(all_pids(ready["port"], 2))
         assert victim not in later and ready["pids"][1] in later
     assert process.returncode == 0
-    assert all(gone(pid) for pid in pids | later)
+    assert all(ended(pid) for pid in pids | later)
 
 
 @pytest.mark.timeout(180)
@@ -101,7 +94,7 @@ def test_no_process_outlives_the_first(tmp_path: Path) -> None:
 
         async def wait() -> None:
             async with asyncio.timeout(30):
-                while not all(gone(pid) for pid in ready["pids"]):
+                while not all(ended(pid) for pid in ready["pids"]):
                     await asyncio.sleep(0.05)
 
         asyncio.run(wait())

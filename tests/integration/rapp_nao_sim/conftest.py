@@ -18,6 +18,8 @@ os.environ.setdefault("QI_LOG_LEVEL", "1")  # libqi logs on standard output othe
 
 import qi
 
+from fakes.processes import children, ended
+
 READY = 30.0  # s
 PATIENCE = 20.0  # s
 
@@ -54,21 +56,9 @@ class Simulator:
             self.process.stdout.close()
 
 
-def children(pid: int) -> list[int]:
-    return [int(child) for task in Path(f"/proc/{pid}/task").iterdir() for child in (task / "children").read_text().split()]
-
-
-def gone(pid: int) -> bool:
-    """Whether a process has ended; one that waits to be reaped has."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except OSError:
-        return True
-
-
 @pytest.fixture(name="gone", scope="session")
 def _gone() -> Callable[[int], bool]:
-    return gone
+    return ended
 
 
 @pytest.fixture(name="children", scope="session")

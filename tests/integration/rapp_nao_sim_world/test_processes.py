@@ -11,23 +11,12 @@ from pathlib import Path
 import cv2
 import pytest
 
+from fakes.processes import children, ended
 from rapp_nao_sim.world.errors import Invalid, Unreachable
 from rapp_nao_sim.world.process import WorldClient, WorldConfig
 
 PATIENCE = 20.0  # s
 SMALL = WorldConfig(width=320, height=240)  # pictures
-
-
-def children(pid: int) -> list[int]:
-    return [int(child) for task in Path(f"/proc/{pid}/task").iterdir() for child in (task / "children").read_text().split()]
-
-
-def gone(pid: int) -> bool:
-    """Whether a process has ended (a zombie that waits for an adoptive parent has)."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return True
 
 
 def test_close_leaves_no_process(tmp_path: Path) -> None:
@@ -38,7 +27,7 @@ def test_close_leaves_no_process(tmp_path: Path) -> None:
     started = set(children(os.getpid())) - set(before)
     assert len(started) == 2
     world.close()
-    assert all(gone(pid) for pid in started)
+    assert all(ended(pid) for pid in started)
     assert not world.alive()
     with pytest.raises(Unreachable, match="not running"):
         world.robot_pose()
@@ -76,7 +65,7 @@ def test_a_hung_process_is_ended_all_the_same() -> None:
     assert pid is not None
     os.kill(pid, signal.SIGSTOP)
     world.close()
-    assert gone(pid)
+    assert ended(pid)
 
 
 def test_a_dead_renderer_is_started_anew(tmp_path: Path) -> None:
@@ -85,7 +74,7 @@ def test_a_dead_renderer_is_started_anew(tmp_path: Path) -> None:
         renderer = next(pid for pid in children(os.getpid()) if "renderer" in Path(f"/proc/{pid}/cmdline").read_text())
         os.kill(renderer, signal.SIGKILL)
         deadline = time.monotonic() + PATIENCE
-        while not gone(renderer):
+        while not ended(renderer):
             assert time.monotonic() < deadline
         world.photograph(tmp_path / "2.png")
         assert (tmp_path / "2.png").stat().st_size > 10_000
@@ -99,10 +88,10 @@ def test_no_process_outlives_its_parent() -> None:
     with subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
         pid = int(parent.stdout.readline())
-        assert not gone(pid)
+        assert not ended(pid)
         parent.kill()
     deadline = time.monotonic() + PATIENCE
-    while not gone(pid):
+    while not ended(pid):
         assert time.monotonic() < deadline
         time.sleep(0.02)
 
