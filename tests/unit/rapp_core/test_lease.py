@@ -12,6 +12,8 @@ from rapp_core.errors import Refused
 from rapp_core.launcher.lease import CRASHED, HANGS, SILENT, Lease
 from rapp_core.manifest import read_manifest
 
+LOOK = 1 / 16  # s between two looks, exact in binary
+
 
 @pytest.fixture
 def clock() -> Clock:
@@ -26,6 +28,15 @@ def lease(clock: Clock) -> Lease:
 def agent(clock: Clock, tmp_path: Path, **script: object) -> FakeAgent:
     manifest = read_manifest(write_rapp(tmp_path / "package", "probe"))
     return FakeAgent(clock, tmp_path / "run", manifest, Script(terminate=None, **script), [], lambda _m: None)  # type: ignore[arg-type]
+
+
+def watched(clock: Clock, lease: Lease, seconds: float, serving: bool) -> str | None:
+    """What is wrong after a time in which the core agent has looked all the while."""
+    problem = None
+    for _ in range(round(seconds / LOOK)):
+        clock.advance(LOOK)
+        problem = lease.problem(serving)
+    return problem
 
 
 def test_only_the_holder_s_secret_is_served(clock: Clock, lease: Lease, tmp_path: Path) -> None:
@@ -67,11 +78,18 @@ def test_a_healthy_holder_is_no_problem(clock: Clock, lease: Lease, tmp_path: Pa
 
 def test_silence_is_seen_just_after_its_bound(clock: Clock, lease: Lease, tmp_path: Path) -> None:
     lease.grant(agent(clock, tmp_path, silent=2.0))
-    clock.advance(1.75)  # the last heartbeat
-    clock.advance(1.0)
-    assert lease.problem(serving=True) is None
-    clock.advance(0.05)
-    assert lease.problem(serving=True) == SILENT
+    assert watched(clock, lease, 1.75, serving=True) is None  # the last heartbeat
+    assert watched(clock, lease, 1.0, serving=True) is None
+    assert watched(clock, lease, LOOK, serving=True) == SILENT
+
+
+def test_a_holder_is_not_silent_because_the_core_agent_stood_still(clock: Clock, lease: Lease, tmp_path: Path) -> None:
+    lease.grant(agent(clock, tmp_path, silent=2.0, stuck=0.0))
+    assert watched(clock, lease, 1.0, serving=False) is None
+    clock.advance(20.0)  # nobody looks, nobody reads what was said
+    assert lease.problem(serving=False) is None
+    assert watched(clock, lease, 1.0, serving=False) is None
+    assert watched(clock, lease, LOOK, serving=False) == SILENT
 
 
 def test_death_is_seen_at_once(clock: Clock, lease: Lease, tmp_path: Path) -> None:
@@ -82,24 +100,25 @@ def test_death_is_seen_at_once(clock: Clock, lease: Lease, tmp_path: Path) -> No
 
 def test_a_loop_that_stands_still_is_seen_though_the_heart_beats(clock: Clock, lease: Lease, tmp_path: Path) -> None:
     lease.grant(agent(clock, tmp_path, stuck=0.0))
-    clock.advance(10.0)
-    assert lease.problem(serving=False) is None
-    clock.advance(0.3)
-    assert lease.problem(serving=False) == HANGS
+    assert watched(clock, lease, 10.0, serving=False) is None
+    assert watched(clock, lease, 0.3, serving=False) == HANGS
+
+
+def test_a_loop_does_not_hang_because_the_core_agent_stood_still(clock: Clock, lease: Lease, tmp_path: Path) -> None:
+    lease.grant(agent(clock, tmp_path, stuck=0.0))
+    clock.advance(20.0)
+    assert watched(clock, lease, 9.9, serving=False) is None
+    assert watched(clock, lease, 0.3, serving=False) == HANGS
 
 
 def test_a_call_of_a_core_service_is_no_standstill(clock: Clock, lease: Lease, tmp_path: Path) -> None:
     lease.grant(agent(clock, tmp_path, stuck=0.0))
     for _ in range(60):
-        clock.advance(0.5)
-        assert lease.problem(serving=True) is None
-    clock.advance(9.9)
-    assert lease.problem(serving=False) is None
-    clock.advance(0.2)
-    assert lease.problem(serving=False) == HANGS
+        assert watched(clock, lease, 0.5, serving=True) is None
+    assert watched(clock, lease, 9.9, serving=False) is None
+    assert watched(clock, lease, 0.2, serving=False) == HANGS
 
 
 def test_calls_of_threads_beside_the_loop_do_not_hide_its_standstill(clock: Clock, lease: Lease, tmp_path: Path) -> None:
     lease.grant(agent(clock, tmp_path, stuck=0.0, waits=False))
-    clock.advance(10.3)
-    assert lease.problem(serving=True) == HANGS
+    assert watched(clock, lease, 10.3, serving=True) == HANGS

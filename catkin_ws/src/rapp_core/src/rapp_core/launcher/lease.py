@@ -13,6 +13,7 @@ from rapp_core.ports import Agent
 CRASHED = "It has crashed"
 SILENT = "It does not answer any more"
 HANGS = "It hangs"
+AWAY = 0.5  # s between two looks above which it is the core agent that has stood still
 
 
 @dataclass(frozen=True)
@@ -31,12 +32,14 @@ class Lease:
         self._now = now
         self._lock = threading.Lock()
         self._grant: Grant | None = None
+        self._looked = self._back = now()  # when `problem` was last asked, and first after the core agent stood still
 
     def grant(self, run: Agent) -> None:
         """Give the lease to a run; whoever held it before holds it no more."""
         self.release()
         with self._lock:
             self._grant = Grant(run)
+            self._looked = self._now()
 
     def release(self) -> None:
         """End the lease; services that still run are cut short."""
@@ -54,18 +57,24 @@ class Lease:
         return grant
 
     def problem(self, serving: bool) -> str | None:
-        """What is wrong with the holder, said aloud; None when all is well. `serving`: a core service runs for it."""
+        """What is wrong with the holder, said aloud; None when all is well. `serving`: a core service runs for it.
+
+        To be asked all the time: what a holder has said while nobody looked may not have been read yet; silence counts anew then.
+        """
         with self._lock:
             grant = self._grant
         if grant is None:
             return None
         run, now = grant.run, self._now()
+        if now - self._looked > AWAY:
+            self._back = now
+        self._looked = now
         if not run.alive:
             return CRASHED
-        if now - run.heartbeat > self._config.heartbeat:
+        if now - max(run.heartbeat, self._back) > self._config.heartbeat:
             return SILENT
         if serving and run.waits:
             run.progress = now
-        elif now - run.progress > self._config.hang:
+        elif now - max(run.progress, self._back) > self._config.hang:
             return HANGS
         return None
