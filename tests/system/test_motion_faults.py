@@ -1,6 +1,6 @@
 """Who moves the robot is killed in the middle of each kind of motion: how long the robot goes on, by its own joints and clock.
 
-A RApp is killed, or stands still, or the core agent is killed. Times are simulated seconds, of a robot in real time; printed at the
+A RApp is killed, or stands still, or the core agent does. Times are simulated seconds, of a robot in real time; printed at the
 end beside the bounds of DESIGN section 3.1.
 """
 
@@ -18,6 +18,7 @@ import pytest
 
 from fakes.rapps import install_rapp
 from fakes.whole_robot import PATIENCE, WholeRobot, whole_robot
+from rapp_core.robot.naoqi import guard
 from rapp_core.robot.naoqi.connection import Connection
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
@@ -26,6 +27,7 @@ SILENT = 1.0  # s without heartbeat after which a lease is silent
 STOPPED = 0.3  # s from then on within which motion has stopped
 FELT = 0.2  # s until a touch is felt
 GUARDED = 1.0  # s from the core agent's end to a still robot
+UNSEEN = guard.EVERY * guard.SILENT  # s for the guard to see that the core agent stands still
 BUSY = 1.0  # s that a busy machine may add: three processes have to get their turns
 SETTINGS = f"""
 register_timeout = 0.5
@@ -89,7 +91,7 @@ for _ in range(40):
     self.pause(0.05)"""
 RISES = "from rapp_api import navigation\nnavigation.take_predefined_posture('StandInit', 1.0)"
 STOPPED_BY_HAND = "You have stopped it"
-REFUSED = "It has failed"  # so says the robot when the RApp may not even publish
+FAILED = "It has failed"  # so says the robot when the RApp may not even publish
 
 took: dict[str, tuple[float, float]] = {}
 
@@ -217,7 +219,7 @@ def test_r03_a_rapp_that_publishes_velocities_past_the_core_agent_moves_nothing(
     with watched(robot) as watch:
         robot.ask("wheels")
         robot.until_listening(robot.seen.index(robot.until(lambda seen: seen.state == "s10", since)))
-    assert set(robot.said(since)) <= {REFUSED}
+    assert set(robot.said(since)) <= {FAILED}
     assert max(walked(watch.moments[0], moment) for moment in watch.moments) < KINDS["move_vel"].noise
 
 
@@ -267,3 +269,19 @@ def test_a_core_agent_killed_in_the_middle_of_a_motion_leaves_a_still_robot(robo
     since = len(robot.seen)
     robot.start("core_agent")
     robot.until_listening(since)
+
+
+@pytest.mark.parametrize("name", ["move_to", "move_joint"])
+def test_a_core_agent_that_stands_still_in_a_motion_leaves_a_still_robot_and_goes_on(robot: WholeRobot, name: str) -> None:
+    since = len(robot.seen)
+    with watched(robot) as watch:
+        frozen = in_the_middle(robot, watch, name)
+        robot.freeze("core_agent")
+        now = watch.until(lambda now: now.time > frozen.time + UNSEEN + GUARDED + BUSY)
+        watch.until(lambda later: later.time > now.time + 1.0)
+        check(f"core agent stands still, {name}", watch.went_on(KINDS[name], frozen.time), UNSEEN + GUARDED)
+        robot.thaw("core_agent")
+    robot.until(lambda seen: seen.detail.startswith(f"core->dynamic reply rapp_{name}: "), since)  # refused or unreachable
+    robot.until(lambda seen: (seen.kind, seen.detail) == ("said", FAILED), since)
+    until_resting(robot)
+    robot.until_only_the_spare_runs()

@@ -1,4 +1,4 @@
-"""kill -9 of the core agent: its guard stops the robot, and the next core agent clears what it left."""
+"""kill -9 or SIGSTOP of the core agent: its guard stops the robot, and the next core agent, or the same, goes on."""
 
 import os
 import signal
@@ -9,8 +9,9 @@ import pytest
 import soundfile
 
 from fakes.processes import children, ended
+from rapp_core.errors import Refused
 from rapp_core.robot.naoqi.connection import Connection
-from rapp_core.robot.naoqi.guard import Guard, stop_robot
+from rapp_core.robot.naoqi.guard import ACTING, EVERY, SILENT, Guard, sensing, stop_robot
 
 LONGEST = 30.0  # s of a motion that nobody stops
 WITHIN = 5.0  # s of it that pass after the kill; a guard on a free machine needs 0.2 s (issue 3: 1 s)
@@ -93,6 +94,36 @@ def test_the_robot_is_still_after_kill_9_and_the_next_core_agent_clears_up(robot
     assert again.stop() == 0
 
 
+def test_the_robot_is_still_while_its_core_agent_stands_still_and_is_watched_on(robot, start, home, wait_for):
+    core = start("rapp_core", "--robot", robot.url, "--home", str(home))
+    wait_for(lambda: guard_of(core.process.pid) is not None)
+    guard = guard_of(core.process.pid)
+    under_way = busy(robot, home)
+    wait_for(lambda: moving(robot))
+    core.process.send_signal(signal.SIGSTOP)
+    try:
+        wait_for(lambda: not moving(robot) and all(future.isFinished() for future in under_way.values()))
+        assert yaw(robot) < 0.9  # stopped, and not arrived
+        assert robot.call("ALSonar", "getSubscribersInfo")  # what it hears and sees with is left to it
+        with pytest.raises(Refused):
+            robot.call("ALSpeechRecognition", "setVocabulary", ["e-mail"], False)
+    finally:
+        core.process.send_signal(signal.SIGCONT)
+    assert guard_of(core.process.pid) == guard
+    robot.start("ALMotion", "angleInterpolation", "HeadYaw", -1.0, LONGEST, True)
+    wait_for(lambda: moving(robot))
+    core.process.kill()
+    wait_for(lambda: not moving(robot) and ended(guard))
+    assert robot.call("ALSonar", "getSubscribersInfo") == []
+
+
+def test_a_core_agent_that_waits_for_a_long_motion_is_left_alone(robot, home):
+    with Guard(robot.url, SUBSCRIBER, home):
+        seconds = EVERY * SILENT + 1.0
+        robot.start("ALMotion", "angleInterpolation", "HeadYaw", 0.3, seconds, True).value(round(seconds * 10_000))
+    assert robot.call("ALMotion", "getAngles", "HeadYaw", False) == pytest.approx([0.3])
+
+
 def test_a_guard_that_dies_is_started_again_and_ends_with_its_core_agent(robot, home, wait_for):
     with Guard(robot.url, SUBSCRIBER, home) as guard:
         first = guard.pid
@@ -132,15 +163,16 @@ def test_two_guards_of_one_data_folder_do_not_overlap(robot, home):
 
 def test_a_robot_that_is_away_is_not_waited_for_without_end():
     connection = Connection("tcp://127.0.0.1:1", 0.5)
-    assert not stop_robot(connection, SUBSCRIBER)
+    assert not stop_robot(connection, ACTING + sensing(SUBSCRIBER))
 
 
-def test_a_robot_without_a_body_is_stopped_too(start, home):
+def test_a_robot_without_a_body_is_stopped_too(start, home, wait_for):
     sim = start("rapp_nao_sim", *SIM, "--no-world", "--files", str(home))
     connection = Connection(f"tcp://127.0.0.1:{sim.ready['port']}", 5.0)
     try:
         spoken = connection.start("ALTextToSpeech", "say", LONG)
-        assert stop_robot(connection, SUBSCRIBER)
+        wait_for(lambda: connection.call("ALMemory", "getListData", ["ALTextToSpeech/TextStarted"]) == [1])
+        assert stop_robot(connection, ACTING + sensing(SUBSCRIBER))
         spoken.value(5_000)
     finally:
         connection.close()
