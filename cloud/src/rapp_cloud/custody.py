@@ -4,16 +4,20 @@ A name belongs to the publisher who first published under it, also after their k
 stays in the signed targets list.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 
+from securesystemslib.signer import Key
 from tuf.api.metadata import DelegatedRole, Delegations, Targets  # type: ignore[attr-defined]
 
+from rapp_cloud.judge import judge
 from rapp_cloud.keys import ROLES
 from rapp_cloud.ledger import Ledger, Lists
 from rapp_hop.errors import Refused
+from rapp_hop.hz.application import Application
+from rapp_hop.hz.standing import KNOWN, YANKED, Standing, package_of, pattern
 from rapp_hop.hz.text import check_name
-from rapp_hop.hz.trust import YANKED
 
 _REVOKED = "revoked"  # in targets: publishers, with their keys and names
 
@@ -50,30 +54,56 @@ class Custody:
         """Return the publishers whose word counts."""
         return [holder for holder in self.holders()[len(ROLES) :] if holder.keys]
 
-    def add(self, publisher: str) -> None:
+    def add(self, publisher: str, application: Application | None = None) -> None:
         """Make a publisher's key and let them publish; one whose key was revoked gets their names back.
 
+        :param application: of one who has made their key at home and keeps it there
         :raises Refused: when there is such a publisher, or the name is a role's
         """
         with self._ledger.locked():
             lists = self._ledger.read()
             if check_name(publisher) in ROLES or publisher in delegated(lists) or publisher.startswith("next_"):
                 raise Refused(f"cannot make the publisher {publisher}: the name is taken")
+            if application is not None:
+                self._ledger.write(lists, ["targets"], admit(self._ledger, lists, application))
+                return
             add_publisher(self._ledger, lists, publisher)
             self._ledger.write(lists, ["targets", publisher])
 
-    def rotate(self, name: str) -> None:
+    def grant(self, publisher: str, names: Sequence[str]) -> None:
+        """Give package names to a publisher, for good.
+
+        :raises Refused: when there is no such publisher, or a name is another's
+        """
+        with self._ledger.locked():
+            lists = self._ledger.read()
+            role = delegated(lists).get(publisher)
+            if role is None:
+                raise Refused(f"cannot give names to {publisher}: they have no key, see ./rapp keys list")
+            free = [name for name in names if owner_of(lists, check_name(name)) is None]
+            if others := [name for name in names if name not in free and pattern(name) not in (role.paths or ())]:
+                raise Refused(f"cannot give {others[0]} to {publisher}: it is {owner_of(lists, others[0])}'s, choose another name")
+            role.paths = [*(role.paths or ()), *(pattern(name) for name in dict.fromkeys(free))]
+            if free:
+                self._ledger.write(lists, ["targets"])
+
+    def rotate(self, name: str, application: Application | None = None) -> None:
         """Give a role or publisher a new key; the old one is worth nothing from then on.
 
         A new root is signed by the old key too, so that robots follow.
 
+        :param application: of a publisher who has made the new key at home, and signed the list that is on offer with it
         :raises Refused: when there is no such role or publisher, or a key that must sign is not here
         """
         with self._ledger.locked():
             lists = self._ledger.read()
-            if name in ROLES:
+            if application is not None and name in delegated(lists):
+                self._ledger.write(lists, ["targets"], follow(lists, application))
+                self._ledger.keys.remove(name)
+            elif name in ROLES:
                 self._rotate_role(lists, name)
             elif name in delegated(lists):
+                self._ledger.signer(lists, name)
                 self._rotate_publisher(lists, name)
             else:
                 raise Refused(f"cannot rotate the key of {name}: it has none, see ./rapp keys list")
@@ -124,12 +154,7 @@ class Custody:
 def add_publisher(ledger: Ledger, lists: Lists, publisher: str) -> Targets:
     """Make a publisher's key and empty list among `lists`, not written yet. See `Custody.add`."""
     signer = ledger.prepare(lists, publisher)
-    before = _revoked(lists).pop(publisher, None)
-    paths = [pattern(name) for name in before["names"]] if before else []
-    if lists.targets.delegations is None:
-        lists.targets.delegations = Delegations({}, {})
-    delegated(lists)[publisher] = DelegatedRole(publisher, [], 1, True, paths)
-    lists.targets.add_key(signer.public_key, publisher)
+    _delegate(lists, publisher, signer.public_key)
     own = Targets()
     known = lists.snapshot.meta.get(f"{publisher}.json")
     own.version = known.version if known else 0
@@ -139,6 +164,58 @@ def add_publisher(ledger: Ledger, lists: Lists, publisher: str) -> Targets:
         own.unrecognized_fields[YANKED] = {**old.unrecognized_fields.get(YANKED, {}), **hashes}
     lists.publishers[publisher] = own
     return own
+
+
+def admit(ledger: Ledger, lists: Lists, application: Application) -> dict[str, bytes]:
+    """Put a publisher who keeps their own key among `lists`; return their list, as signed, to be written.
+
+    :raises HopError: when the key was revoked, or the list is not an empty one with the right number
+    """
+    publisher, key = application.publisher, application.key
+    if key.keyid in _revoked(lists).get(publisher, {}).get("keyids", ()):
+        raise Refused(f"cannot take this key: it was revoked, have {publisher} make another with ./rapp keys own --anew")
+    known = lists.snapshot.meta.get(f"{publisher}.json")
+    last = known.version if known else 0
+    if application.own.version != last + 1:
+        again = f"./rapp keys own {publisher} --after {last}"
+        raise Refused(f"cannot take list {application.own.version} of {publisher}: {last + 1} comes next, have them run {again}")
+    _delegate(lists, publisher, key)
+    empty = Targets()
+    empty.version = last
+    change = judge(Standing(publisher, lists.targets, empty), application.data, datetime.now(UTC))
+    if change.added is not None:
+        raise Refused(f"cannot take the list of {publisher}: it must be empty, have them run ./rapp keys own {publisher}")
+    if known:
+        before = Standing(publisher, lists.targets, ledger.list_of(publisher, last)).known
+        lists.targets.unrecognized_fields.setdefault(KNOWN, {})[publisher] = before
+    lists.publishers[publisher] = change.own
+    return {publisher: application.data}
+
+
+def follow(lists: Lists, application: Application) -> dict[str, bytes]:
+    """Put a new key in the place of a publisher's, with the list on offer signed by it; return that list, to be written.
+
+    :raises HopError: when the list is another
+    """
+    publisher, own = application.publisher, lists.publishers[application.publisher]
+    for keyid in list(delegated(lists)[publisher].keyids):
+        lists.targets.revoke_key(keyid, publisher)
+    lists.targets.add_key(application.key, publisher)
+    change = judge(Standing(publisher, lists.targets, own), application.data, datetime.now(UTC))
+    if change.added is not None or change.withdrawn:
+        raise Refused(f"cannot take the list of {publisher}: it must have the packages on offer, have them make it again")
+    lists.publishers[publisher] = change.own
+    return {publisher: application.data}
+
+
+def _delegate(lists: Lists, publisher: str, key: Key) -> None:
+    """Name a publisher and their key; names that were theirs are theirs again."""
+    before = _revoked(lists).pop(publisher, None)
+    if lists.targets.delegations is None:
+        lists.targets.delegations = Delegations({}, {})
+    paths = [pattern(name) for name in before["names"]] if before else []
+    delegated(lists)[publisher] = DelegatedRole(publisher, [], 1, True, paths)
+    lists.targets.add_key(key, publisher)
 
 
 def delegated(lists: Lists) -> dict[str, DelegatedRole]:
@@ -159,16 +236,6 @@ def owner_of(lists: Lists, name: str) -> str | None:
         if name in entry["names"]:
             raise Refused(f"cannot publish {name}: it is {publisher}'s, whose key was revoked; make a new one for them first")
     return None
-
-
-def pattern(name: str) -> str:
-    """Return TUF's path pattern of all versions of a package."""
-    return f"{name}-*.hz"
-
-
-def package_of(path: str) -> str:
-    """Return the package that a pattern of ours stands for."""
-    return path.removesuffix("-*.hz")
 
 
 def _revoked(lists: Lists) -> dict[str, dict[str, list[str]]]:

@@ -1,9 +1,11 @@
 """Files that appear whole or not at all, and JSON files that somebody else may change meanwhile."""
 
+import io
 import os
 import secrets
+import shutil
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from rapp_hop import strict_json
 from rapp_hop.errors import Refused
@@ -14,11 +16,21 @@ def write_whole(path: Path, data: bytes, *, mode: int = 0o644) -> None:
 
     :raises OSError: when the disk refuses; what was there before is still there then
     """
+    _write_aside(path, io.BytesIO(data), mode)
+
+
+def copy_whole(source: Path, path: Path, *, mode: int = 0o644) -> None:
+    """Do as `write_whole` with what is in another file, piece by piece."""
+    with source.open("rb") as data:
+        _write_aside(path, data, mode)
+
+
+def _write_aside(path: Path, data: BinaryIO, mode: int) -> None:
     aside = path.with_name(f".{path.name}.{secrets.token_hex(6)}")
     handle = os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            shutil.copyfileobj(data, file)
             file.flush()
             os.fsync(file.fileno())
         aside.replace(path)

@@ -5,7 +5,7 @@ each publisher's list names their packages. Order of a change: lists from below,
 that a robot sees the old state or the new one. Blocking.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -88,15 +88,22 @@ class Ledger:
         found: Targets = self._read(f"{version}.{name}.json", Targets)
         return found
 
-    def write(self, lists: Lists, changed: Iterable[str]) -> None:
+    def write(self, lists: Lists, changed: Iterable[str], given: Mapping[str, bytes] | None = None) -> None:
         """Sign and write the changed lists anew (targets, publishers), then snapshot and timestamp.
 
         "snapshot" among the changed has that signed anew; nothing changed: the timestamp alone.
+
+        :param given: publishers' lists that were signed elsewhere; `lists` has them too
         """
-        names = set(changed)
+        given = given or {}
+        names = {*changed, *given}
         for name in sorted(names - {"snapshot"}, key=lambda name: (name == "targets", name)):
             signed = lists.targets if name == "targets" else lists.publishers[name]
-            data = self._sign(lists, name, signed, self.expiry.targets)
+            if name in given:
+                data = given[name]
+                write_whole(self.folder / f"{signed.version}.{name}.json", data)
+            else:
+                data = self._sign(lists, name, signed, self.expiry.targets)
             lists.snapshot.meta[f"{name}.json"] = MetaFile.from_data(signed.version, data, ["sha256"])
         if names:
             data = self._sign(lists, "snapshot", lists.snapshot, self.expiry.snapshot)
@@ -134,7 +141,8 @@ class Ledger:
             if self.keys.has(kept) and (signer := self.keys.signer(kept)).public_key.keyid in wanted:
                 return signer
         if not self.keys.has(name):
-            raise Refused(f"cannot sign as {name}: {name}.pem is not in {self.keys.folder}, bring it there")
+            next_step = "who has it signs with --cloud" if name in lists.publishers else "bring it there"
+            raise Refused(f"cannot sign as {name}: {name}.pem is not in {self.keys.folder}, {next_step}")
         raise Refused(f"cannot sign as {name}: its key in {self.keys.folder} is not the one that robots believe")
 
     def prepare(self, lists: Lists, name: str) -> CryptoSigner:

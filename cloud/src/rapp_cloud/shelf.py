@@ -16,15 +16,16 @@ from typing import BinaryIO
 from tuf.api.exceptions import RepositoryError
 from tuf.api.metadata import TargetFile, Targets  # type: ignore[attr-defined]  # public, but not in __all__
 
-from rapp_cloud.custody import Custody, add_publisher, delegated, owner_of, pattern
+from rapp_cloud.custody import Custody, add_publisher, delegated, owner_of
+from rapp_cloud.desk import Desk
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import ROLES, KeyRing, Passphrase
 from rapp_cloud.ledger import Expiry, Ledger, Lists
 from rapp_hop.errors import Bug, Invalid, Refused
 from rapp_hop.hz.archive import Contents, extract, inspect, package_file_name
 from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.standing import YANKED, custom_of, pattern
 from rapp_hop.hz.tar import Limits
-from rapp_hop.hz.trust import YANKED
 
 __all__ = ["Expiry", "Offer", "Shelf"]
 
@@ -69,6 +70,7 @@ class Shelf:
         self._manifests: dict[str, Manifest] = {}  # by hash and path: a package never changes
         self._seen: tuple[tuple[int, int], list[Offer]] | None = None  # state of the timestamp's file, and what was on offer
         self.custody = Custody(self._ledger)
+        self.desk = Desk(self._ledger, self.targets, self._limits, self.manifests)
 
     @property
     def root_file(self) -> Path:
@@ -135,7 +137,7 @@ class Shelf:
             if check is not None:
                 check(manifest, [offer.manifest for offer in self._offers(lists)])
             target = TargetFile.from_data(path, package, ["sha256"])
-            target.unrecognized_fields["custom"] = _custom(manifest, robots)
+            target.unrecognized_fields["custom"] = custom_of(manifest, robots)
             own.targets[path] = target
             own.unrecognized_fields.get(YANKED, {}).pop(path, None)
             write_whole(self.targets / f"{digest}.{path}", package)
@@ -278,8 +280,3 @@ def _known(own: Targets, path: str) -> str | None:
         return own.targets[path].hashes["sha256"]
     found: str | None = own.unrecognized_fields.get(YANKED, {}).get(path)
     return found
-
-
-def _custom(manifest: Manifest, robots: tuple[str, ...]) -> dict[str, object]:
-    custom: dict[str, object] = {"name": manifest.name, "version": manifest.version.text}
-    return {**custom, "robots": list(robots)} if robots else custom

@@ -9,7 +9,8 @@ from rapp_hop.protocol import TURNED_AWAY
 
 DAY = 86400  # seconds
 EVERYBODY = frozenset({"available_services", "openapi"})
-SCOPES_OF = {"runs": frozenset({"read", "robot"})}
+_PUBLISH = frozenset({"publish"})
+SCOPES_OF = {"runs": frozenset({"read", "robot"}), "publish_package": _PUBLISH, "publish_list": _PUBLISH}
 """Which scopes let a service be called, where it is not `robot`."""
 _ROBOT = frozenset({"robot"})
 

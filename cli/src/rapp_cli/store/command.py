@@ -1,10 +1,12 @@
-"""`./rapp store list|show|yank`: what is on offer."""
+"""`./rapp store list|show|yank|renew`: what is on offer, here or in a store elsewhere."""
 
 import argparse
 
 from rapp_cli.errors import UsageError
+from rapp_cli.store.far import about, list_far, renew_far, show_far, yank_far
 from rapp_cli.store.place import add_store_options, noting, store_of, told
-from rapp_cloud.shelf import Offer, Shelf
+from rapp_cli.store.remote import add_cloud_option
+from rapp_cloud.shelf import Shelf
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -13,16 +15,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     listing = actions.add_parser("list", help="one line per package")
     showing = actions.add_parser("show", help="all versions of a RApp, what it may do, how to ask for it, who made it")
     yanking = actions.add_parser("yank", help="take a version off offer; robots that have it keep it")
+    renewing = actions.add_parser("renew", help="sign a publisher's list in a store elsewhere for another year")
     for action in (showing, yanking):
         action.add_argument("name")
     yanking.add_argument("version")
-    for action in (listing, showing, yanking):
+    for action in (yanking, renewing):
+        action.add_argument("--publisher", metavar="NAME", help="who signs, in a store elsewhere (whose key is here)")
+    for action in (listing, showing, yanking, renewing):
         add_store_options(action)
+        add_cloud_option(action)
 
 
 @told
 def run(options: argparse.Namespace) -> int:
     """Do one of them."""
+    if options.cloud:
+        return {"list": list_far, "show": show_far, "yank": yank_far, "renew": renew_far}[options.action](options)
+    if options.action == "renew":
+        raise UsageError("cannot renew lists here: the platform does so by itself; name one elsewhere with --cloud")
     shelf = store_of(options)
     return {"list": _list, "show": _show, "yank": _yank}[options.action](shelf, options)
 
@@ -39,30 +49,12 @@ def _show(shelf: Shelf, options: argparse.Namespace) -> int:
     if not offers:
         raise UsageError(f"cannot show {options.name}: it is not in the store, see ./rapp store list")
     newest = next((offer for offer in reversed(offers) if not offer.yanked), offers[-1])
-    for line in _about(newest):
+    for line in about(newest.manifest, newest.publisher):
         print(line)
     for offer in offers:
         state = "yanked" if offer.yanked else "for " + ", ".join(offer.robots) if offer.robots else ""
         print(f"  {offer.manifest.version.text:<12} {offer.length:>9} bytes  sha256 {offer.sha256}  {state}".rstrip())
     return 0
-
-
-def _about(offer: Offer) -> list[str]:
-    manifest = offer.manifest
-    asked = {**{f"keywords, {key}": value for key, value in manifest.keywords.items()}}
-    asked |= {f"sentences, {key}": value for key, value in manifest.sentences.items()}
-    needs = [*(manifest.needs.robot or ("any robot",)), f"API {manifest.needs.api}"]
-    facts = {
-        "about": (manifest.description,),
-        "author": (manifest.author or "unknown",),
-        "publisher": (offer.publisher,),
-        "agent": (manifest.agent,),
-        "needs": needs,
-        "may use": (*manifest.permissions.core, *manifest.permissions.cloud),
-        "partner": (manifest.partner,) if manifest.partner else (),
-        **asked,
-    }
-    return [manifest.name, *(f"  {name}: {', '.join(value)}" for name, value in facts.items() if value)]
 
 
 def _yank(shelf: Shelf, options: argparse.Namespace) -> int:

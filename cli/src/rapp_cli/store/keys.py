@@ -1,8 +1,14 @@
-"""`./rapp keys list|new|rotate|revoke`: who may sign for what in a store."""
+"""`./rapp keys list|new|grant|rotate|revoke`: who may sign for what in a store; `own`: a publisher's own key, at home."""
 
 import argparse
+from pathlib import Path
 
+from rapp_cli.errors import UsageError
+from rapp_cli.store.own_key import add_own_options, make_own
 from rapp_cli.store.place import add_store_options, store_of, told
+from rapp_hop.hz.application import Application, read_application
+
+_DONE = {"new": "may publish", "grant": "has the names", "rotate": "has a new key", "revoke": "has no key any more"}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -16,15 +22,25 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     new = actions.add_parser("new", help="make a publisher, or give one whose key was revoked another")
     rotate = actions.add_parser("rotate", help="give a role (root, targets, snapshot, timestamp) or publisher a new key")
     revoke = actions.add_parser("revoke", help="take a publisher's key away, and all it has signed off offer")
-    for action in (new, rotate, revoke):
+    grant = actions.add_parser("grant", help="give names of RApps to a publisher, for good")
+    own = actions.add_parser(
+        "own", help="on a publisher's own computer: make the key that stays there, and the file that asks for it"
+    )
+    for action in (new, rotate, revoke, grant, own):
         action.add_argument("name")
-    for action in (listing, new, rotate, revoke):
+    grant.add_argument("rapp", nargs="+")
+    for action in (new, rotate):
+        action.add_argument("--public", type=Path, metavar="FILE", help="of a publisher who has made it with ./rapp keys own")
+    for action in (listing, new, rotate, revoke, grant):
         add_store_options(action)
+    add_own_options(own)
 
 
 @told
 def run(options: argparse.Namespace) -> int:
     """Do one of them."""
+    if options.action == "own":
+        return make_own(options)
     custody = store_of(options).custody
     if options.action == "list":
         for holder in custody.holders():
@@ -32,7 +48,20 @@ def run(options: argparse.Namespace) -> int:
             here = "key here" if holder.here else "key elsewhere" if holder.keys else ""
             print(f"{holder.name:<12} {until:<16} {here:<13} {' '.join(holder.keys)}  {', '.join(holder.packages)}".rstrip())
         return 0
-    {"new": custody.add, "rotate": custody.rotate, "revoke": custody.revoke}[options.action](options.name)
-    done = {"new": "may publish", "rotate": "has a new key", "revoke": "has no key any more"}[options.action]
-    print(f"{options.name} {done}")
+    if options.action in ("new", "rotate"):
+        (custody.add if options.action == "new" else custody.rotate)(options.name, _application(options))
+    elif options.action == "grant":
+        custody.grant(options.name, options.rapp)
+    else:
+        custody.revoke(options.name)
+    print(f"{options.name} {_DONE[options.action]}")
     return 0
+
+
+def _application(options: argparse.Namespace) -> Application | None:
+    if options.public is None:
+        return None
+    application = read_application(options.public.read_bytes())
+    if application.publisher != options.name:
+        raise UsageError(f"cannot take the key for {options.name}: {options.public} is {application.publisher}'s")
+    return application

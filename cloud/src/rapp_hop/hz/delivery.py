@@ -87,7 +87,7 @@ class Delivery:
         :raises Unreachable: try again later; `reason` says when it came too slowly
         """
         loop = asyncio.get_running_loop()
-        transport = _LoopTransport(self._client, loop, self._limits)
+        transport = LoopTransport(self._client, loop, self._limits)
 
         def tell(phase: str, **details: Any) -> None:
             if on_phase is not None:
@@ -145,7 +145,7 @@ class Delivery:
         except OSError as error:
             raise Refused(f"cannot tidy up downloads: {error.strerror}, check the disk") from None
 
-    def _install(self, transport: "_LoopTransport", wish: "_Wish", tell: _Tell) -> Installed:
+    def _install(self, transport: "LoopTransport", wish: "_Wish", tell: _Tell) -> Installed:
         store = TrustedStore(transport, f"{self._client.base_url}/tuf", self._root, self._home / "trust", self._limits.package)
         try:
             offered = store.versions(wish.name)
@@ -212,10 +212,11 @@ class _Wish:
             raise Refused(f"cannot install {self.name}: {'; '.join(reasons)}")
 
 
-class _LoopTransport:
+class LoopTransport:
     """Bytes for a thread, fetched by the client of a loop."""
 
     def __init__(self, client: HopClient, loop: asyncio.AbstractEventLoop, limits: DeliveryLimits) -> None:
+        """Remember the parts."""
         self._client = client
         self._loop = loop
         self._limits = limits

@@ -33,6 +33,7 @@ from rapp_hop.hz.attacks import Attack, Away, Untrusted, translated, untrusted
 from rapp_hop.hz.downloads import partial
 from rapp_hop.hz.lock import held
 from rapp_hop.hz.semver import Version, parse_version
+from rapp_hop.hz.standing import YANKED, Standing
 from rapp_hop.hz.tar import Limits
 from rapp_hop.hz.text import check_name
 from rapp_hop.streaming import Progress, Writer
@@ -40,7 +41,6 @@ from rapp_hop.streaming import Progress, Writer
 __all__ = ["SIGNED_AT", "YANKED", "Attack", "Release", "Transport", "TrustedStore", "Untrusted", "Versions", "choose"]
 
 SIGNED_AT = "signed_at"  # in the timestamp: when it was signed, ISO 8601
-YANKED = "yanked"  # in a publisher's list: packages that were taken off offer, by path
 CLOCK_TOLERANCE = timedelta(hours=1)  # by which the robot's clock may be behind the store's
 _PATIENCE = 60.0  # seconds for another process that looks at the store
 
@@ -109,6 +109,22 @@ class TrustedStore:
                 releases += [item for item in found if item is not None and item.name == name]
                 yanked |= _yanked(targets, name)
             return Versions(tuple(sorted(releases, key=lambda item: item.version.key)), frozenset(yanked))
+
+    def standings(self, publisher: str | None = None) -> list[Standing]:
+        """Refresh the metadata and return how publishers stand who have a name, all lists verified.
+
+        :param publisher: only this one; None: all
+        :raises Untrusted: naming the attack
+        :raises Unreachable: when the store cannot be reached or is not complete
+        """
+        with self._lock, translated(Attack.MIX_AND_MATCH), self._alone():
+            updater = self._updater()
+            updater.refresh()
+            self._check_clock()
+            targets = self._cached("targets", Targets)
+            roles = (targets.delegations.roles or {}) if targets.delegations else {}
+            named = [(name, role.paths[0]) for name, role in roles.items() if role.paths and publisher in (None, name)]
+            return [Standing(name, targets, self._lists(updater, path.replace("*", "0"))[-1]) for name, path in named]
 
     def download(self, release: Release, destination: Path, on_progress: Progress | None = None) -> None:
         """Write the package of `release` to `destination`, verified as a whole; nothing is left when it is wrong.

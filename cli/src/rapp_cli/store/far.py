@@ -1,0 +1,109 @@
+"""`./rapp store list|show|yank|renew --cloud URL`: a store elsewhere. What is shown was verified as a robot does it."""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from rapp_cli.errors import UsageError
+from rapp_cli.store.remote import (
+    RemoteStore,
+    folder_of,
+    publisher_of,
+    remote_of,
+    ring_of,
+    signer_of,
+    with_store,
+)
+from rapp_hop.hz.archive import inspect
+from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.standing import Standing, package_of, signed
+from rapp_hop.hz.text import check_name
+from rapp_hop.hz.trust import Versions, choose
+
+
+def list_far(options: argparse.Namespace) -> int:
+    """One line per package."""
+    standings = with_store(remote_of(options, token=False), RemoteStore.standings)
+    for standing in standings:
+        for path, target in sorted(standing.own.targets.items()):
+            name, _, version = path.removesuffix(".hz").partition("-")
+            print(f"{name:<24} {version:<12} {standing.publisher:<12} {target.length:>9} bytes")
+    return 0
+
+
+def show_far(options: argparse.Namespace) -> int:
+    """All versions of a RApp, and what the newest one says of itself. Raises UsageError when there is none."""
+    name = check_name(options.name)
+
+    async def look(store: RemoteStore) -> tuple[Manifest, str, Versions]:
+        offered = await store.versions(name)
+        if not offered.releases:
+            raise UsageError(f"cannot show {name}: it is not in the store, see ./rapp store list")
+        owners = [one.publisher for one in await store.standings() if name in _names(one)]
+        with tempfile.TemporaryDirectory() as folder:
+            package = Path(folder, "package")
+            await store.download(choose(offered, name), package)
+            with package.open("rb") as file:
+                return inspect(file).manifest, ", ".join(owners), offered
+
+    manifest, publisher, offered = with_store(remote_of(options, token=False), look)
+    for line in about(manifest, publisher):
+        print(line)
+    for release in offered.releases:
+        state = "for " + ", ".join(release.robots) if release.robots else ""
+        sha256 = release.target.hashes["sha256"]
+        print(f"  {release.version.text:<12} {release.length:>9} bytes  sha256 {sha256}  {state}".rstrip())
+    for version in sorted(offered.yanked):
+        print(f"  {version:<12} yanked")
+    return 0
+
+
+def yank_far(options: argparse.Namespace) -> int:
+    """Take a version off offer."""
+    remote, ring = remote_of(options), ring_of(folder_of(options))
+    publisher = publisher_of(ring, options.publisher)
+
+    async def yank(store: RemoteStore) -> None:
+        standing = await store.standing(publisher)
+        await store.replace(signed(standing.without(options.name, options.version), signer_of(ring, standing)))
+
+    with_store(remote, yank)
+    print(f"{options.name} {options.version} is off offer")
+    return 0
+
+
+def renew_far(options: argparse.Namespace) -> int:
+    """Sign the list that is on offer for longer."""
+    remote, ring = remote_of(options), ring_of(folder_of(options))
+    publisher = publisher_of(ring, options.publisher)
+
+    async def renew(store: RemoteStore) -> str:
+        standing = await store.standing(publisher)
+        follows = standing.renewed()
+        await store.replace(signed(follows, signer_of(ring, standing)))
+        return f"{follows.expires:%F}"
+
+    print(f"the list of {publisher} is good until {with_store(remote, renew)}")
+    return 0
+
+
+def about(manifest: Manifest, publisher: str) -> list[str]:
+    """What a RApp says of itself, in lines for the terminal."""
+    asked = {**{f"keywords, {key}": value for key, value in manifest.keywords.items()}}
+    asked |= {f"sentences, {key}": value for key, value in manifest.sentences.items()}
+    needs = [*(manifest.needs.robot or ("any robot",)), f"API {manifest.needs.api}"]
+    facts = {
+        "about": (manifest.description,),
+        "author": (manifest.author or "unknown",),
+        "publisher": (publisher,),
+        "agent": (manifest.agent,),
+        "needs": needs,
+        "may use": (*manifest.permissions.core, *manifest.permissions.cloud),
+        "partner": (manifest.partner,) if manifest.partner else (),
+        **asked,
+    }
+    return [manifest.name, *(f"  {name}: {', '.join(value)}" for name, value in facts.items() if value)]
+
+
+def _names(standing: Standing) -> list[str]:
+    return [package_of(path) for path in standing.role.paths or ()]
