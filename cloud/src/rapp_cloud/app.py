@@ -26,6 +26,7 @@ from rapp_cloud.runs_page import runs_page
 from rapp_cloud.services.agents import agent_calls, agent_services
 from rapp_cloud.services.people import people_services
 from rapp_cloud.services.presence import presence_services
+from rapp_cloud.services.publishing import publishing_services
 from rapp_cloud.services.runs import run_services
 from rapp_cloud.services.sight import sight_services
 from rapp_cloud.services.voice import voice_services
@@ -144,6 +145,7 @@ def _registry(
             *voice_services(robots, shelf, run),
             *agent_services(agents, robots),
             *sight_services(),
+            *publishing_services(shelf.desk, memory.accounts, memory.audit, config.publisher_quota * 2**20),
         ]
     )
 
