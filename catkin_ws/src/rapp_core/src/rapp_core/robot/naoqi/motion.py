@@ -16,6 +16,7 @@ ROBOT_SPACE = 2
 STANDING = "Standing"  # NAOqi's family of postures on straight or bent legs
 FAMILIES = {"Sitting": "Sit", "LyingBelly": "LyingBelly", "LyingBack": "LyingBack"}
 """Of NAOqi's families those in which a robot can be without motors, and a posture of each."""
+ARRIVED = 0.02  # rad between a joint and its goal
 NAMES = (
     "a joint, a chain (Head, LArm, RArm, LLeg, RLeg), Torso, or a sensor (CameraTop, CameraBottom, MicroFront, Accelerometer, ...)"
 )
@@ -45,7 +46,14 @@ class NaoqiMotion:
         joints = tuple(angles)
         self._connection.call("ALMotion", "setStiffnesses", list(joints), 1.0)
         goals = list(angles.values())
-        return self._begin("ALMotion", "angleInterpolationWithSpeed", list(joints), goals, speed, joints=joints)
+        begun = self._begin("ALMotion", "angleInterpolationWithSpeed", list(joints), goals, speed, joints=joints)
+        begun.judge = lambda: self._arrived(joints, goals)
+        return begun
+
+    def _arrived(self, joints: Sequence[str], goals: Sequence[float]) -> bool:
+        """Whether joints have been led to their goals: NAOqi does not tell a motion that was ended from one that has arrived."""
+        led = self._connection.call("ALMotion", "getAngles", list(joints), False)
+        return all(abs(angle - goal) <= ARRIVED for angle, goal in zip(led, goals, strict=True))
 
     def take_posture(self, name: str, speed: float) -> Movement:
         """See `body_ports.Motion`."""

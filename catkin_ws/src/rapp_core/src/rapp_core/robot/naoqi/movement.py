@@ -15,6 +15,8 @@ class NaoqiMovement:
         self._future = future
         self._halt = halt
         self._stopped = False
+        self.judge: Callable[[], bool] | None = None
+        """Whether the goal of a motion that has ended is reached, where NAOqi does not tell."""
 
     def done(self) -> bool:
         """See `body_ports.Movement`."""
@@ -29,7 +31,9 @@ class NaoqiMovement:
         """See `body_ports.Movement`; NAOqi answers some motions with whether they have reached their goal."""
         if self._stopped:
             return False
-        return self._connection.result(self._future, *self._call) is not False
+        if self._connection.result(self._future, *self._call) is False:
+            return False
+        return self.judge is None or self.judge()
 
     def cancel(self) -> None:
         """See `body_ports.Movement`."""
