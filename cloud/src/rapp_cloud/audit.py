@@ -93,10 +93,12 @@ class Audit:
                 connection.execute(sa.text(f"SELECT pg_advisory_xact_lock({_LOCK})"))
             last = connection.execute(sa.select(audit.c.number, audit.c.seal).order_by(audit.c.number.desc()).limit(1)).first()
             number, seal = (last.number, last.seal) if last else (0, "")
+            sealed = []
             for row in rows:
                 number += 1
                 seal = _seal(key, seal, {**row, "number": number})
-                connection.execute(sa.insert(audit).values(row | {"number": number, "seal": seal}))
+                sealed.append({**row, "number": number, "seal": seal})
+            connection.execute(sa.insert(audit), sealed)
         for row in rows:
             _log.info("%s %s %s", row["who"], row["deed"], row["subject"])
         _log.info("audit log: %d entries, seal %s", number, seal)

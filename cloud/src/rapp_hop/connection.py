@@ -13,7 +13,7 @@ from tornado.httputil import HTTPConnection, HTTPHeaders, HTTPMessageDelegate, R
 from rapp_hop.errors import HopError, Refused, Unreachable
 from rapp_hop.heading import make_head
 from rapp_hop.heads import Head, Job
-from rapp_hop.protocol import WireAnswer
+from rapp_hop.protocol import OpenFile, WireAnswer
 from rapp_hop.sending import send
 from rapp_hop.spool import Spool
 from rapp_hop.streams import PatientStream, PatientTlsStream
@@ -149,8 +149,8 @@ class Message(HTTPMessageDelegate):
             self._site.running(self, True)
 
     async def _serve(self) -> None:
+        answer = self._answer
         try:
-            answer = self._answer
             if answer is None and self._job is not None:
                 answer = await self._job.run(await self._body.whole() if self._body is not None else b"")
             if answer is not None and not self.stream.closed():
@@ -164,6 +164,8 @@ class Message(HTTPMessageDelegate):
             self.stream.close()
         finally:
             self._end()
+            if answer is not None and isinstance(answer.body, OpenFile):
+                answer.body.file.close()
             if self._job is not None:
                 await self._job.done()
             self._site.running(self, False)

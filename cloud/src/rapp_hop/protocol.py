@@ -8,7 +8,7 @@ from collections.abc import AsyncGenerator, Mapping
 from dataclasses import dataclass
 from mmap import mmap
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
 from rapp_hop.errors import Bug, HopError, Invalid, Refused, Unreachable
 from rapp_hop.service import Service
@@ -32,12 +32,21 @@ class WireRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class OpenFile:
+    """A part of a file to send; whoever sends the answer closes it."""
+
+    file: BinaryIO
+    start: int  # bytes
+    length: int  # bytes
+
+
+@dataclass(frozen=True, slots=True)
 class WireAnswer:
     """An HTTP answer to send; a body that is a path is that file, a generator comes in pieces."""
 
     status: int
     content_type: str
-    body: bytes | Path | AsyncGenerator[bytes, None]
+    body: bytes | Path | OpenFile | AsyncGenerator[bytes, None]
     headers: tuple[tuple[str, str], ...] = ()
 
 

@@ -3,19 +3,19 @@
 import asyncio
 import functools
 import logging
+import os
 import time
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from email.utils import formatdate
 from http import HTTPStatus
 from pathlib import Path
-from typing import BinaryIO
 
 from tornado.iostream import BaseIOStream, StreamClosedError
 
-from rapp_hop.protocol import WireAnswer
+from rapp_hop.file_sending import TooShortError, send_file
+from rapp_hop.protocol import OpenFile, WireAnswer
 
-PIECE = 256 * 1024  # bytes
 _REASONS = {status.value: status.phrase for status in HTTPStatus}
 _FIXED = b"Server: rapp\r\nX-Content-Type-Options: nosniff\r\nCache-Control: no-store\r\n"
 _log = logging.getLogger(__name__)
@@ -31,7 +31,7 @@ async def send(stream: BaseIOStream, answer: WireAnswer, keep: bool, without_bod
         if isinstance(answer.body, bytes):
             head = head_of(answer, keep, len(answer.body), version)
             await _put(stream, head if without_body else head + answer.body, patience)
-        elif isinstance(answer.body, Path):
+        elif isinstance(answer.body, Path | OpenFile):
             await _send_file(stream, answer, answer.body, keep, without_body, version, patience)
         else:
             await _send_stream(stream, answer, answer.body, keep, without_body, version, patience)
@@ -47,19 +47,18 @@ async def _put(stream: BaseIOStream, data: bytes, patience: float) -> None:
 
 
 async def _send_file(
-    stream: BaseIOStream, answer: WireAnswer, path: Path, keep: bool, without_body: bool, version: str, patience: float
+    stream: BaseIOStream, answer: WireAnswer, body: Path | OpenFile, keep: bool, without_body: bool, version: str, patience: float
 ) -> None:
-    file, size = await asyncio.to_thread(_open, path)
-    with file:
-        await _put(stream, head_of(answer, keep, size, version), patience)
-        while size and not without_body:
-            piece = await asyncio.to_thread(file.read, min(size, PIECE))
-            if not piece:
-                _log.error("a file of an answer became shorter while it was sent")
-                stream.close()
-                return
-            size -= len(piece)
-            await _put(stream, piece, patience)
+    part = await asyncio.to_thread(_open, body) if isinstance(body, Path) else body
+    with part.file:
+        await _put(stream, head_of(answer, keep, part.length, version), patience)
+        if without_body:
+            return
+        try:
+            await send_file(stream, part, patience)
+        except TooShortError:
+            _log.error("a file of an answer became shorter while it was sent")
+            stream.close()
 
 
 async def _send_stream(
@@ -125,6 +124,6 @@ def _date(second: int) -> bytes:
     return formatdate(second, usegmt=True).encode()
 
 
-def _open(path: Path) -> tuple[BinaryIO, int]:
+def _open(path: Path) -> OpenFile:
     file = path.open("rb")
-    return file, path.stat().st_size
+    return OpenFile(file, 0, os.fstat(file.fileno()).st_size)
