@@ -14,6 +14,7 @@ SUBJECTS = {
     "rosbridge": "rosbridge.py",
     "hop": "hop.py",
     "robot": "robot.py",
+    "store": "store.py",
 }
 """Subject to program."""
 
