@@ -1,6 +1,6 @@
 """The link, the platform and the mail server behind it, in memory."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,7 @@ class FakeLink:
     def keep(self, run: str) -> None:
         self.kept.append(run)
 
-    def request(self, name: str, arguments: Mapping[str, Any], timeout: float) -> Any:
+    def request(self, name: str, arguments: Mapping[str, Any], timeout: float, cut: Callable[[], bool] = lambda: False) -> Any:
         self.asked.append((name, dict(arguments)))
         if self.away:
             raise Unreachable("cannot reach the link: it is away")
@@ -40,7 +40,10 @@ class FakeLink:
             raise self.errors[name]
         if name in self.answers:
             answer = self.answers[name]
-            return answer(arguments) if callable(answer) else answer
+            result = answer(arguments) if callable(answer) else answer
+            if cut():
+                raise Refused("cannot finish: it was stopped")
+            return result
         if name == "install":
             return self._install(arguments["name"])
         return {"register": {"registered": True, "lease": 30}, "list_rapps": {"rapps": self.catalogue}}[name]

@@ -69,6 +69,7 @@ class WholeRobot:
         self.maildir = folder / "mail"
         self.logs = folder / "logs"
         self.settings = ""  # of the core agent, in TOML, beside its defaults
+        self.failures = 1000  # in a row until a RApp is not started for a while: tests make them fail on purpose
         self.body = () if body else ("--no-world",)  # options of the simulator
         self.cloud_port = free_port()
         self.cloud_url = f"http://127.0.0.1:{self.cloud_port}"  # as the link reaches the platform
@@ -120,7 +121,7 @@ class WholeRobot:
 
     def _config(self) -> Path:
         path = self.folder / "core_agent.toml"
-        path.write_text(self.settings)
+        path.write_text(f"failures = {self.failures}\n{self.settings}")
         return path
 
     @property

@@ -1,6 +1,8 @@
 """The core FSM (paper Fig. 2) with everything around it in memory: ways through it, failures, bounds."""
 
+import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,11 @@ from fakes.rapps import install_rapp, write_rapp
 from fakes.robot import FakeRobot
 from rapp_agent import Subsystem
 from rapp_core.config import Config
+from rapp_core.control.attention import Attention, OwnVoice
 from rapp_core.control.cloud_agent import CloudAgents
-from rapp_core.control.control import Control, Parts
+from rapp_core.control.control import Control
 from rapp_core.control.fsm import core_machine
+from rapp_core.control.parts import Parts
 from rapp_core.control.platform import Platform
 from rapp_core.errors import Bug, Invalid, Refused, Unreachable
 from rapp_core.launcher.lease import Lease
@@ -44,12 +48,15 @@ class Home:
         self.lease = Lease(self.config, self.clock.now)
         self.stop = self.clock.event()
         listening = folder / "listening"
-        context = Context(self.fake.robot, self.config, self.trace, listening, cut=self.stop, now=self.clock.now)
+        voice = OwnVoice(self.fake.robot.voice, self.config, self.clock.now)
+        attention = Attention(self.fake.robot.ears, "stop", self.config.stop_threshold, voice)
+        robot = replace(self.fake.robot, voice=voice, ears=attention)
+        context = Context(robot, self.config, self.trace, listening, cut=self.stop, now=self.clock.now)
         self.executor = Executor(context)
         self.platform = Platform(self.link, self.config)
         self.cloud_agents = CloudAgents(self.link, self.config)
         parts = Parts(
-            self.fake.robot, self.link, self.agents, self.executor, self.platform, self.cloud_agents, self.lease,
+            robot, attention, self.link, self.agents, self.executor, self.platform, self.cloud_agents, self.lease,
             self.trace, self.config, self.stop, self.clock.now,
         )  # fmt: skip
         self.control = Control(parts)
@@ -474,14 +481,140 @@ def test_a_rapp_that_fails(home: Home) -> None:
     assert "dismantle" in home.fake.journal
 
 
-def test_a_hand_on_its_head_stops_a_rapp(home: Home) -> None:
-    home.agents.script = Script(terminate=None)
+# the person stops it
+
+STOP_WORDS = "You have stopped it"
+
+
+def eventually(condition: Callable[[], bool]) -> None:
+    """Wait for what a thread of its own does."""
+    waiting = threading.Event()
+    assert any(condition() or waiting.wait(0.01) for _ in range(1000))
+
+
+def lay_hand(home: Home) -> None:
+    home.fake.robot.feeling.hand = True
+    eventually(home.control._stopping.given)
+
+
+def begin_to_say_stop(home: Home) -> None:
+    eventually(lambda: "stop" in home.fake.body.vocabulary and home.fake.body.listener is not None)
+    home.fake.person_says("stop", 0.8, seconds=0.4)
+
+
+def say_stop(home: Home) -> None:
+    begin_to_say_stop(home)
+    home.clock.advance(1.0)
+    eventually(home.control._stopping.given)
+
+
+WAYS = pytest.mark.parametrize("stop", [lay_hand, say_stop])
+
+
+@WAYS
+@pytest.mark.parametrize(("state", "rest"), [("s8", ["s10", "s11", "s3"]), ("s9", ["s10", "s11", "s3"]), ("s6", ["s11", "s3"])])
+def test_l11_the_person_stops_it_between_the_keyword_and_the_end(
+    home: Home, stop: Callable[[Home], None], state: str, rest: list[str]
+) -> None:
+    home.agents.script = Script(first_word=None if state == "s8" else 0.1, terminate=None)
     home.start()
     ask(home)
-    home.step_until(lambda: home.machine.state == "s9")
-    home.fake.robot.feeling.hand = True
-    assert home.control._touch._felt.wait(5)
-    assert failing_round(home) == (BROKEN, ["You have stopped it"])
+    home.step_until(lambda: home.machine.state == state)
+    stop(home)
+    states, said = failing_round(home)
+    assert states[-len(rest) - 1 :] == [state, *rest]
+    assert said == [STOP_WORDS]
+    assert not any(run.alive for run in home.agents.runs)
+
+
+@WAYS
+def test_l11_an_answer_of_the_platform_is_not_waited_for(home: Home, stop: Callable[[Home], None]) -> None:
+    for service in ("interpret", "install"):
+        home.link.answers[service] = lambda _: stop(home)
+    home.start()
+    ask(home, "please tell me how late it is", seconds=2.5, probability=0.1)
+    assert failing_round(home) == (["s3", "s5", "s11", "s3"], [STOP_WORDS])
+    home.fake.robot.feeling.hand = False
+    home.happenings.clear()
+    home.happenings.append(Happening("core", "core", "s3", "entered", "listen"))
+    ask(home)
+    assert failing_round(home) == (["s3", "s4", "s6", "s11", "s3"], [STOP_WORDS] * 2)
+
+
+@pytest.mark.parametrize("stop", [lay_hand, begin_to_say_stop])
+def test_l11_the_person_ends_the_question_which_rapp_is_meant(home: Home, stop: Callable[[Home], None]) -> None:
+    ask_what_fits_two(home, None)
+    home.clock.after(2.0, lambda: stop(home))
+    assert failing_round(home) == (["s3", "s5", "s12", "s11", "s3"], [QUESTION, STOP_WORDS])
+
+
+def test_l11_while_it_only_listens_the_word_is_none(home: Home) -> None:
+    home.start()
+    ask(home)
+    home.round()
+    home.clock.after(1.0, lambda: home.fake.person_says("stop"))
+    home.clock.after(5.0, home.stop.set)
+    home.machine.step(home.share)
+    assert "stop" not in home.fake.body.vocabulary
+    assert home.fake.said() == []
+
+
+def test_l11_what_the_person_has_stopped_has_not_failed(home: Home) -> None:
+    home.agents.script = Script(terminate=None, crash=0.5)
+    home.start()
+    for _ in range(4):
+        ask(home)
+        home.step_until(lambda: home.machine.state == "s9")
+        lay_hand(home)
+        home.step_until(lambda: home.machine.state == "s3")
+        home.fake.robot.feeling.hand = False
+    assert home.fake.said() == [STOP_WORDS] * 4
+
+
+# a RApp that fails again and again
+
+
+def fails(home: Home, times: int) -> list[str]:
+    """Ask that often; gives what was said."""
+    for _ in range(times):
+        ask(home)
+        home.step_until(lambda: home.machine.state == "s9" or home.machine.state == "s11")
+        home.step_until(lambda: home.machine.state == "s3")
+    return home.fake.said()
+
+
+def test_l13_a_rapp_that_keeps_failing_is_not_started_for_a_while(home: Home) -> None:
+    install_rapp(home.config.home, "clock", keywords=("what time is it",))
+    home.agents.script = Script(outcome=("failed", "KeyError: 'name'"))
+    home.start()
+    *failed, refused = fails(home, 4)
+    assert failed == ["It has failed"] * 3
+    assert refused.startswith("clock keeps failing, I will not start it before ")
+    assert len(home.agents.runs) == 3
+
+
+@pytest.mark.parametrize("outcome", [("done", ""), ("failed", "Unreachable: cannot reach the platform")])
+def test_l13_who_succeeds_or_finds_others_away_is_started(home: Home, outcome: tuple[str, str]) -> None:
+    install_rapp(home.config.home, "clock", keywords=("what time is it",))
+    home.agents.script = Script(outcome=outcome)
+    home.start()
+    fails(home, 5)
+    assert len(home.agents.runs) == 5
+
+
+def test_l13_a_success_between_them_starts_the_count_anew(home: Home) -> None:
+    install_rapp(home.config.home, "clock", keywords=("what time is it",))
+    home.start()
+    for outcome in (
+        ("failed", "ValueError"),
+        ("failed", "ValueError"),
+        ("done", ""),
+        ("failed", "ValueError"),
+        ("failed", "ValueError"),
+    ):
+        home.agents.script = Script(outcome=outcome)
+        fails(home, 1)
+    assert len(home.agents.runs) == 5
 
 
 @pytest.mark.parametrize(

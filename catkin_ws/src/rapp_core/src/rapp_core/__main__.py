@@ -6,16 +6,20 @@ import os
 import signal
 import sys
 import threading
+from dataclasses import replace
 
 import rospy
 
 from rapp_agent import Subsystem
 from rapp_core.config import Config, read
+from rapp_core.control.attention import Attention, OwnVoice
 from rapp_core.control.cloud_agent import CloudAgents
-from rapp_core.control.control import Control, Parts
+from rapp_core.control.control import Control
 from rapp_core.control.fsm import core_machine
+from rapp_core.control.parts import Parts
 from rapp_core.control.platform import API_VERSION, Platform
 from rapp_core.control.run_reports import RunReports
+from rapp_core.control.words import STOP
 from rapp_core.errors import CoreError, Invalid
 from rapp_core.launcher.launcher import Launcher
 from rapp_core.launcher.lease import Lease
@@ -73,6 +77,9 @@ def main() -> int:
 def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     connection = Connection(config.robot, config.naoqi_timeout)
     nao = robot(connection, config)
+    voice = OwnVoice(nao.voice, config)
+    attention = Attention(nao.ears, STOP.get(config.language), config.stop_threshold, voice)
+    nao = replace(nao, voice=voice, ears=attention)
     trace, states, lease = Trace(), StatePublisher(), Lease(config)
     trace.listen(states.tell)
     context, hop = Context(nao, config, trace, config.home / "listening", cut=stop), RosHop(stop, trace)
@@ -80,7 +87,7 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     platform, cloud_agents = Platform(hop, config), CloudAgents(hop, config)
     reports = RunReports(launcher, hop, config.home, API_VERSION)
     reports.start(trace)
-    control = Control(Parts(nao, hop, reports, executor, platform, cloud_agents, lease, trace, config, stop))
+    control = Control(Parts(nao, attention, hop, reports, executor, platform, cloud_agents, lease, trace, config, stop))
     RosServices(executor, Outside(hop, cloud_agents, config, stop), Keepsakes(config), lease, trace)
     RosActions(executor, lease, trace)
     machine, rejoining = core_machine(control), Rejoining()

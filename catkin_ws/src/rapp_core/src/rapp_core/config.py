@@ -39,6 +39,7 @@ class Config:
     kind: str = "nao"
     language: str = "en"  # of the person
     threshold: float = 0.4  # probability below which a word counts as unrecognised (paper section V.A.2)
+    stop_threshold: float = 0.5  # probability from which the word that stops the robot counts; a wrong one ends a RApp
     recognise_timeout: float = 8.0  # s that rapp_recognize listens unless told otherwise
     long_command: float = 1.4  # s; a longer sound that is no keyword is a long command; includes the detector's hang-over
     longest_keyword: float = 2.5  # s; a longer sound is no isolated keyword, whatever the recogniser makes of it
@@ -76,6 +77,9 @@ class Config:
     hang: float = 10.0  # s the dynamic agent's own loop may stand still outside of core services
     dismantle: float = 5.0  # s for the dynamic agent to stop what it has started
     terminate: float = 2.0  # s from SIGTERM to SIGKILL
+    failures: int = 3  # in a row, of one version of a RApp, after which it is not started for a while
+    quarantine: float = 60.0  # s of that while; each further failure doubles it
+    quarantine_longest: float = 86_400.0  # s
     limits: Limits = Limits()
 
 

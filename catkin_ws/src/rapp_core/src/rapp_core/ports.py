@@ -100,8 +100,11 @@ class Robot:
 class Hop(Protocol):
     """The link: all calls that leave the robot (rapp_hop/*)."""
 
-    def request(self, name: str, arguments: Mapping[str, Any], timeout: float) -> Any:
-        """Ask, wait for the end of the job, give its JSON result. Raises Refused, Unreachable, Invalid, Bug."""
+    def request(self, name: str, arguments: Mapping[str, Any], timeout: float, cut: Callable[[], bool] = lambda: False) -> Any:
+        """Ask, wait for the end of the job, give its JSON result. Raises Refused, Unreachable, Invalid, Bug.
+
+        Once `cut` holds the job is cancelled, and refused.
+        """
 
     def keep(self, run: str) -> None:
         """Tell the link that a run with a cloud agent lives; "": none does. Returns at once, also without a link."""

@@ -43,3 +43,8 @@ class Telling:
         """The link could not do it; `error` is the wire word."""
         if self._told:
             self._trace.reply("link", "core", f"{self._what}: {error}")
+
+    def cut(self) -> None:
+        """The core agent does not wait for the end of the job any more, and has it cancelled."""
+        if self._told:
+            self._trace.send("core", "link", f"cancel {self._what}")

@@ -27,14 +27,25 @@ class Trial:
         self._hop = hop
         self._trace = trace
         self._package = Path()
-        self._why = ""
+        self.why = ""
+        """How the RApp itself has failed; empty while it has not."""
         self._initialising = False
 
     def begin(self, package: Path) -> None:
         """An installed package, `.../<name>/<version>`, is about to be started; the link sees when it was used last."""
         with contextlib.suppress(OSError):
             os.utime(package)
-        self._package, self._why, self._initialising = package, "", False
+        self._package, self.why, self._initialising = package, "", False
+
+    @property
+    def name(self) -> str:
+        """Of the RApp."""
+        return self._package.parent.name
+
+    @property
+    def version(self) -> str:
+        """That was started."""
+        return self._package.name
 
     def told(self, message: Mapping[str, Any]) -> None:
         """What has passed over the dynamic agent's channel; its s2 is its `initialise`, its s3 what it is there for (Fig. 3)."""
@@ -44,15 +55,15 @@ class Trial:
 
     def failed(self, why: str) -> None:
         """The RApp itself has failed."""
-        self._why = self._why or why
+        self.why = self.why or why
 
     def end(self, run: str, spoken: bool) -> str | None:
         """The run is over; `spoken`: it has said its first word. Gives what to say when the version before is back."""
-        name, version = self._package.parent.name, self._package.name
+        name, version = self.name, self.version
         ok = spoken and not self._initialising
-        if not (ok or self._why) or not self._on_trial() or not self._hop.present:
+        if not (ok or self.why) or not self._on_trial() or not self._hop.present:
             return None
-        arguments = {"run": run, "name": name, "version": version, "ok": ok, "detail": "" if ok else self._why}
+        arguments = {"run": run, "name": name, "version": version, "ok": ok, "detail": "" if ok else self.why}
         try:
             before = self._hop.request("started", arguments, ANSWERED).get("back")
         except CoreError as error:
@@ -60,7 +71,7 @@ class Trial:
             return None
         if before is None:
             return None
-        self._trace.note(f"{name} {version} did not start ({self._why}), {before} is back")
+        self._trace.note(f"{name} {version} did not start ({self.why}), {before} is back")
         return "The new version did not start, the one before is back"
 
     def _on_trial(self) -> bool:

@@ -6,7 +6,7 @@ import queue
 import threading
 import time
 import uuid
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import rospy
@@ -22,6 +22,17 @@ SILENCE = 0.9  # s without a sign of life of the link after which it is gone
 ASKING = 3.0  # s for the link to accept a job
 STEP = 0.05  # s
 GONE = "cannot reach the link: it is not running, or rosbridge is away"
+
+Cut = Callable[[], bool]
+
+
+class _Cut(Refused):
+    """Whoever has asked does not want the answer any more."""
+
+
+def _check(cut: Cut) -> None:
+    if cut():
+        raise _Cut("cannot finish: it was stopped")
 
 
 class RosHop:
@@ -53,10 +64,10 @@ class RosHop:
         """See `ports.Hop`."""
         self._runs.publish(run)
 
-    def request(self, name: str, arguments: Mapping[str, Any], timeout: float) -> Any:
+    def request(self, name: str, arguments: Mapping[str, Any], timeout: float, cut: Cut = lambda: False) -> Any:
         """See `ports.Hop`."""
         deadline = time.monotonic() + timeout
-        self._wait_present(min(deadline, time.monotonic() + 2 * SILENCE))
+        self._wait_present(min(deadline, time.monotonic() + 2 * SILENCE), cut)
         job = uuid.uuid4().hex
         events: queue.Queue[Any] = queue.Queue(maxsize=1000)
         with self._lock:
@@ -65,8 +76,12 @@ class RosHop:
         try:
             tell.asked()
             boot = self._boot
-            self._ask(name, job, json.dumps(arguments), timeout)
-            return self._wait(name, events, deadline, tell, boot)
+            self._ask(name, job, json.dumps(arguments), timeout, cut)
+            return self._wait(name, events, deadline, tell, boot, cut)
+        except _Cut:
+            tell.cut()
+            self._cancel.publish(job)
+            raise
         except Unreachable:
             self._cancel.publish(job)
             raise
@@ -74,12 +89,13 @@ class RosHop:
             with self._lock:
                 del self._jobs[job]
 
-    def _wait_present(self, until: float) -> None:
+    def _wait_present(self, until: float, cut: Cut) -> None:
         while not self._reachable():
+            _check(cut)
             if time.monotonic() > until or self._stop.wait(STEP):
                 raise Unreachable(GONE)
 
-    def _ask(self, name: str, job: str, arguments: str, timeout: float) -> None:
+    def _ask(self, name: str, job: str, arguments: str, timeout: float, cut: Cut) -> None:
         """Call the link's service in a thread of its own: rospy knows no time-out of a call."""
         answer: queue.Queue[Any] = queue.Queue(maxsize=1)
 
@@ -90,17 +106,22 @@ class RosHop:
                 answer.put(error)
 
         threading.Thread(target=call, name=f"hop {name}", daemon=True).start()
-        try:
-            outcome = answer.get(timeout=ASKING)
-        except queue.Empty:
-            raise Unreachable(f"{GONE} ({name} was not accepted in {ASKING:g} s)") from None
+        until = time.monotonic() + ASKING
+        outcome: Any = None
+        while outcome is None:
+            _check(cut)
+            with contextlib.suppress(queue.Empty):
+                outcome = answer.get(timeout=STEP)
+            if outcome is None and time.monotonic() > until:
+                raise Unreachable(f"{GONE} ({name} was not accepted in {ASKING:g} s)")
         if isinstance(outcome, Exception):
             raise Unreachable(f"{GONE} ({outcome})") from outcome
         if not outcome.accepted:
             raise Refused(outcome.message or f"cannot {name}: the link does not accept it")
 
-    def _wait(self, name: str, events: "queue.Queue[Any]", deadline: float, tell: Telling, boot: str) -> Any:
+    def _wait(self, name: str, events: "queue.Queue[Any]", deadline: float, tell: Telling, boot: str, cut: Cut) -> Any:
         while True:
+            _check(cut)
             try:
                 event = events.get(timeout=STEP)
             except queue.Empty:

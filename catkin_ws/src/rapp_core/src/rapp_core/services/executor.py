@@ -81,9 +81,9 @@ class Executor:
             _log.info("the robot is not back in posture %s: %s", before, error)
             self._context.calls.keep_before(before)
 
-    def run(self, name: str, /, **request: Any) -> Reply:
+    def run(self, name: str, /, call: Call | None = None, **request: Any) -> Reply:
         """Execute one service for the core agent itself; gives its reply. Raises CoreError."""
-        return self._execute(name, request, replace(self._context, call=Call()), preempt=False)
+        return self._execute(name, request, replace(self._context, call=call or Call()), preempt=False)
 
     def run_for(self, grant: Grant, name: str, /, call: Call | None = None, preempt: bool = False, **request: Any) -> Reply:
         """Execute one service for the dynamic agent that holds the lease; cut short when the lease ends. Raises CoreError.

@@ -1,0 +1,96 @@
+"""Versions of RApps that fail again and again: started again after a while only, each time a longer one.
+
+Kept on disk, and read at each question, so that neither the core agent's end nor the robot's ends a quarantine. What ends it: a
+success, another version, or the end of its time, after which the next failure brings a longer one.
+"""
+
+import json
+import logging
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+from rapp_core.config import Config
+
+FILE = "quarantine.json"
+TEXT = 300  # characters kept of why it failed
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """How a version has failed in a row; times in s since 1970."""
+
+    version: str
+    failures: int
+    since: float
+    until: float
+    why: str
+
+
+class Quarantine:
+    """By the RApp's name: one version of it at a time."""
+
+    def __init__(self, config: Config, wall: Callable[[], float] = time.time) -> None:
+        self._path = config.home / FILE
+        self._config = config
+        self._wall = wall
+
+    def refusal(self, name: str, version: str) -> str | None:
+        """What to say of a version that is not to be started now; None when it may be."""
+        entry, now = self._entries().get(name), self._wall()
+        if entry is None or entry.version != version or not entry.since <= now < entry.until:
+            return None  # a clock that went back shows nothing, so it ends the quarantine
+        return f"{name.replace('_', ' ')} keeps failing, I will not start it before {_spoken(entry.until, now)}"
+
+    def failed(self, name: str, version: str, why: str) -> None:
+        """It has failed, and nobody else is to blame."""
+        config, entries, now = self._config, self._entries(), self._wall()
+        entry = entries.get(name)
+        failures = 1 + (entry.failures if entry is not None and entry.version == version else 0)
+        more = failures - config.failures
+        seconds = min(config.quarantine * 2.0 ** min(more, 64), config.quarantine_longest) if more >= 0 else 0.0
+        entries[name] = Entry(version, failures, now, now + seconds, why[:TEXT])
+        self._write(entries)
+        if seconds:
+            _log.warning("%s %s has failed %d times: not started for %.0f s", name, version, failures, seconds)
+
+    def succeeded(self, name: str) -> None:
+        """It has come to its end."""
+        entries = self._entries()
+        if entries.pop(name, None) is not None:
+            self._write(entries)
+
+    def _entries(self) -> dict[str, Entry]:
+        try:
+            read = json.loads(self._path.read_text("utf-8"))
+            return {
+                str(name): Entry(
+                    str(entry["version"]), int(entry["failures"]), float(entry["since"]), float(entry["until"]), str(entry["why"])
+                )
+                for name, entry in read.items()
+            }
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            _log.warning("cannot read %s: %r; no RApp is in quarantine", self._path, error)
+            return {}
+
+    def _write(self, entries: dict[str, Entry]) -> None:
+        aside = self._path.with_suffix(".new")
+        try:
+            with aside.open("w", encoding="utf-8") as file:
+                json.dump({name: asdict(entry) for name, entry in entries.items()}, file)
+                file.flush()
+                os.fsync(file.fileno())
+            aside.replace(self._path)
+        except OSError as error:
+            _log.warning("cannot keep which RApps fail: %s", error)
+
+
+def _spoken(moment: float, now: float) -> str:
+    """A time of the day, as the robot says it."""
+    then = time.localtime(moment + 59)  # the first whole minute in which it is over
+    clock = time.strftime("%H:%M", then)
+    return clock if then.tm_yday == time.localtime(now).tm_yday else f"tomorrow {clock}"
