@@ -18,5 +18,5 @@ VOLUME /data
 EXPOSE 9001
 HEALTHCHECK --interval=5s --timeout=5s --start-period=60s \
  CMD ["python", "-c", "import ssl, urllib.request as u; \
-u.urlopen('https://127.0.0.1:9001/tuf/metadata/timestamp.json', timeout=4, context=ssl.create_default_context(cafile='/data/tls/certificate.pem'))"]
+u.urlopen('https://127.0.0.1:9001/readyz', timeout=4, context=ssl.create_default_context(cafile='/data/tls/certificate.pem'))"]
 ENTRYPOINT ["docker/cloud"]

@@ -1,4 +1,4 @@
-"""`./rapp cloud …`: back-ups, accounts, tokens and the audit log of a home's platform; the commands of `python -m rapp_cloud`."""
+"""`./rapp cloud …`: back-ups, accounts, tokens, persons, audit log of a home's platform; the commands of `python -m rapp_cloud`."""
 
 import argparse
 

@@ -62,9 +62,10 @@ def make_platform(data: Path, robot: str) -> None:
         raise CommandError(f"cannot make the platform's keys in {data}: {made.stderr.strip()}")
 
 
-def write_profile(path: Path, contacts: Mapping[str, str]) -> None:
-    """Write the profile of the robot's user: who they are, whom they write to (name to mail address)."""
+def write_profile(data: Path, robot: str, contacts: Mapping[str, str]) -> None:
+    """Write down the robot's user for the platform to take over: who they are, whom they write to (name to mail address)."""
     listed = [{"name": name, "address": address} for name, address in contacts.items()]
+    path = data / "profiles" / f"{robot}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps({"name": USER, "language": "en", "contacts": listed}, indent=2))
 

@@ -18,7 +18,6 @@ from rapp_cloud.config import PREFIX, CloudConfig, load_config
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import PASSPHRASE, passphrase_from
 from rapp_cloud.memory import open_memory
-from rapp_cloud.profiles import Profile, Profiles
 from rapp_cloud.tls import CERTIFICATE, make_certificate
 from rapp_cloud.witness import noting_offers
 from rapp_hop.errors import HopError
@@ -92,8 +91,6 @@ def _init(words: list[str]) -> int:
         token_file.parent.mkdir(exist_ok=True, mode=0o700)
         with open_memory(data, load_config(data, {}, os.environ).database) as memory:
             write_whole(token_file, memory.accounts.add_robot(robot).encode(), mode=0o600)
-    if not (data / "profiles" / f"{robot}.json").exists():
-        Profiles(data / "profiles").put(robot, Profile(robot, "en", ()))
     given = [token_file, data / "root.json"]
     if options.host:
         certificate = data / "tls" / CERTIFICATE

@@ -12,7 +12,8 @@ from typing import Any
 import sqlalchemy as sa
 
 from rapp_cloud.database.engine import Database
-from rapp_cloud.database.tables import accounts, marks, tokens
+from rapp_cloud.database.marks import mark_of, raise_mark
+from rapp_cloud.database.tables import accounts, tokens
 from rapp_cloud.files import read_json
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.text import check_name
@@ -75,7 +76,7 @@ class Accounts:
         :raises HopError: see `Database.reading`
         """
         with self.database.reading() as connection:
-            mark = connection.execute(sa.select(marks.c.value).where(marks.c.name == _MARK)).scalar()
+            mark = mark_of(connection, _MARK)
             if mark == self._mark and mark is not None:
                 return
             rows = connection.execute(sa.select(tokens).where(tokens.c.revoked.is_(None))).all()
@@ -85,7 +86,7 @@ class Accounts:
     def add_robot(self, robot: str) -> str:
         """Make a robot's account, if it has none yet, and a token for it; return the token."""
         with self.database.writing() as connection:
-            self._account(connection, robot, "robot", None)
+            self.add_account(connection, robot, "robot")
             token = self.add_token(connection, robot)
         self.refresh()
         return token
@@ -116,7 +117,7 @@ class Accounts:
         words = " ".join(sorted(scopes or SCOPES[role]))
         row = {"hash": hash_of(token), "name": name, "created": now, "scopes": words, "expires": now + life if life else None}
         connection.execute(sa.insert(tokens).values(**row, **limits))
-        _raise_mark(connection)
+        raise_mark(connection, _MARK)
         return token
 
     def revoke(self, begin: str) -> int:
@@ -125,7 +126,7 @@ class Accounts:
         with self.database.writing() as connection:
             change = sa.update(tokens).where(wanted, tokens.c.revoked.is_(None)).values(revoked=self.clock())
             count = connection.execute(change).rowcount
-            _raise_mark(connection)
+            raise_mark(connection, _MARK)
         self.refresh()
         return count
 
@@ -142,7 +143,14 @@ class Accounts:
         :raises Refused: when somebody of another role has the name
         """
         with self.database.writing() as connection:
-            self._account(connection, name, role, password)
+            self.add_account(connection, name, role, password)
+
+    def close(self, connection: sa.Connection, name: str) -> None:
+        """Take back an account and all its tokens, within a transaction."""
+        mine = sa.update(tokens).where(tokens.c.name == name, tokens.c.revoked.is_(None))
+        connection.execute(mine.values(revoked=self.clock()))
+        connection.execute(sa.delete(accounts).where(accounts.c.name == name))
+        raise_mark(connection, _MARK)
 
     def adopt(self, path: Path) -> None:
         """Take over tokens.json of an older platform: keep the hashes, remove the file.
@@ -160,15 +168,16 @@ class Accounts:
         with self.database.writing() as connection:
             known = set(connection.execute(sa.select(tokens.c.hash)).scalars())
             for token, robot in given.items():
-                self._account(connection, robot, "robot", None)
+                self.add_account(connection, robot, "robot")
                 row = {"hash": hash_of(token), "name": robot, "created": self.clock(), "scopes": "robot"}
                 if row["hash"] not in known:
                     connection.execute(sa.insert(tokens).values(row))
-            _raise_mark(connection)
+            raise_mark(connection, _MARK)
         path.unlink()
         _log.info("tokens: %d taken over from %s, which is gone", len(found), path.name)
 
-    def _account(self, connection: sa.Connection, name: str, role: str, password: str | None) -> None:
+    def add_account(self, connection: sa.Connection, name: str, role: str, password: str | None = None) -> None:
+        """Do as `open`, within a transaction."""
         here = accounts.c.name == check_name(name)
         known = connection.execute(sa.select(accounts.c.role).where(here)).scalar()
         if known not in (None, role):
@@ -187,8 +196,3 @@ def hash_of(secret: str) -> str:
 
 def _holder(row: Any) -> Holder:
     return Holder(row.hash[:ID], row.name, frozenset(row.scopes.split()), row.expires, row.rate, row.quota)
-
-
-def _raise_mark(connection: sa.Connection) -> None:
-    if not connection.execute(sa.update(marks).where(marks.c.name == _MARK).values(value=marks.c.value + 1)).rowcount:
-        connection.execute(sa.insert(marks).values(name=_MARK, value=1))

@@ -1,4 +1,4 @@
-"""The commands of who runs a platform: back-ups, accounts, tokens, audit log. Each works beside a platform that serves."""
+"""The commands of who runs a platform: back-ups, accounts, tokens, persons, audit log. Each works beside a platform that serves."""
 
 import argparse
 import getpass
@@ -13,6 +13,7 @@ from pathlib import Path
 from rapp_cloud.backup import back_up, restore
 from rapp_cloud.config import load_config
 from rapp_cloud.memory import Memory, open_memory
+from rapp_cloud.people_commands import add_actions
 from rapp_hop.errors import Refused
 
 
@@ -110,6 +111,17 @@ def _revoke(words: list[str]) -> int:
     return 0 if count else 1
 
 
+def _person(words: list[str]) -> int:
+    parser = _parser("person", "The persons of a home: what they are called, whom they write to, which robots serve them.")
+    add_actions(parser)
+    options = parser.parse_args(words)
+    with _memory(options) as memory:
+        print(options.do(memory, options))
+        if options.deed != "person show":
+            memory.audit.add(_who(), options.deed, getattr(options, "person", None) or options.robot)
+    return 0
+
+
 def _audit(words: list[str]) -> int:
     parser = _parser("audit", "Show the audit log; with --check, look whether it was changed.")
     parser.add_argument("--last", type=int, default=100, metavar="N", help="entries (%(default)s)")
@@ -139,6 +151,6 @@ def _who() -> str:
 
 COMMANDS: Mapping[str, Callable[[list[str]], int]] = {
     "backup": _backup, "restore": _restore, "invite": _invite, "account": _account, "token": _token, "tokens": _tokens,
-    "revoke": _revoke, "audit": _audit,
+    "revoke": _revoke, "person": _person, "audit": _audit,
 }  # fmt: skip
 """By the word after `python -m rapp_cloud`."""

@@ -20,7 +20,6 @@ from rapp_cloud.interpreter.port import Commands, Interpretation, Interpreter
 from rapp_cloud.keys import Passphrase
 from rapp_cloud.memory import Memory, remembering
 from rapp_cloud.metrics import MeasuredServer, Metrics
-from rapp_cloud.profiles import Profiles
 from rapp_cloud.robots import Robots
 from rapp_cloud.runs_page import runs_page
 from rapp_cloud.services.agents import agent_calls, agent_services
@@ -140,7 +139,7 @@ def _registry(
     return ServiceRegistry(
         [
             *presence_services(robots, shelf),
-            *people_services(Profiles(config.data / "profiles")),
+            *people_services(memory.people),
             *run_services(memory.reports, memory.audit, memory.accounts),
             *voice_services(robots, shelf, run),
             *agent_services(agents, robots),

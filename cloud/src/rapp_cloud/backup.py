@@ -1,4 +1,4 @@
-"""Back-up and restore of a whole platform: every table, the store with its keys, profiles, settings, in one file.
+"""Back-up and restore of a whole platform: every table, the store with its keys, settings, in one file.
 
 The tables are written as JSON lines, so a back-up of SQLite can be restored into PostgreSQL and the other way round. The file
 holds the platform's secrets: its mode is 0600. Taken while the platform serves, it is one state of the database and one of
@@ -27,7 +27,8 @@ from rapp_hop.hz.lock import held
 
 FORMAT = 1
 KEPT = ("audit.key", "cloud.toml", "keys", "profiles", "robots", "root.json", "tls", "tuf")
-"""What of the data folder is in a back-up, beside the database; the rest is of the moment."""
+"""What of the data folder is in a back-up, beside the database; the rest is of the moment. (Profiles that could not be taken over
+are files still.)"""
 _LIST = "rapp-backup.json"
 _ASIDE = ".restoring"
 _ROWS = 1000  # inserted at once

@@ -11,6 +11,7 @@ from rapp_cloud.accounts import Accounts
 from rapp_cloud.admission import Admission
 from rapp_cloud.audit import Audit
 from rapp_cloud.database.engine import FILE, Database
+from rapp_cloud.people import People
 from rapp_cloud.registrations import Registrations
 from rapp_cloud.reports import Reports
 from rapp_cloud.robots import Robots
@@ -27,6 +28,7 @@ class Memory:
         self.database = database
         self.accounts = Accounts(database)
         self.admission = Admission(self.accounts)
+        self.people = People(self.accounts)
         self.audit = Audit(database, folder)
         self.reports = Reports(database)
 
@@ -47,7 +49,7 @@ def open_memory(data: Path, url: str | None = None) -> Iterator[Memory]:
 
 @asynccontextmanager
 async def remembering(data: Path, url: str | None, robots: Robots) -> AsyncIterator[Memory]:
-    """`open_memory` for a process that serves: tokens and leases are kept in step with the database until the block ends."""
+    """`open_memory` for a process that serves: tokens, people, leases stay in step with the database meanwhile."""
     memory = await asyncio.to_thread(_open, data, url)
     registrations, stop = Registrations(memory.database, robots), asyncio.Event()
     try:
@@ -73,7 +75,9 @@ def _open(data: Path, url: str | None) -> Memory:
         memory.database.migrate()
         memory.accounts.adopt(data / "tokens.json")
         memory.reports.adopt(data / "reports")
+        memory.people.adopt(data / "profiles")
         memory.accounts.refresh()
+        memory.people.refresh()
     except BaseException:
         memory.database.close()
         raise
@@ -88,10 +92,11 @@ async def _keep_in_step(memory: Memory, registrations: Registrations, stop: asyn
             await asyncio.wait_for(stop.wait(), STEP)
         try:
             await asyncio.to_thread(memory.accounts.refresh)
+            await asyncio.to_thread(memory.people.refresh)
             await asyncio.to_thread(registrations.write)
             await asyncio.to_thread(memory.audit.write)
             well = True
         except HopError as error:
             if well:  # said once, not at every step
-                _log.error("%s; tokens and leases are those of before meanwhile", error)
+                _log.error("%s; tokens, people and leases are those of before meanwhile", error)
             well = False

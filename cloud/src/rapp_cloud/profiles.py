@@ -1,14 +1,11 @@
-"""The user of each robot: `profiles/<robot>.json` with name, language and the contacts mail may go to (deliverable §3.3)."""
+"""What is known of a person: name, language and the contacts mail may go to (deliverable §3.3). Pure."""
 
 import re
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
-from rapp_cloud.files import read_json, write_whole
-from rapp_hop import strict_json
-from rapp_hop.errors import Invalid, Refused
-from rapp_hop.hz.text import check_name, check_text
+from rapp_hop.errors import Invalid
+from rapp_hop.hz.text import check_text
 
 MAX_BYTES = 2**20  # of one profile
 MAX_CONTACTS = 1000
@@ -17,7 +14,7 @@ _ADDRESS = re.compile(r"[^\s@<>,;:\"()\\\[\]\x00-\x1f\x7f]{1,64}@[A-Za-z0-9.-]{1
 
 @dataclass(frozen=True)
 class Contact:
-    """Somebody the user writes to."""
+    """Somebody the person writes to."""
 
     name: str
     address: str
@@ -25,7 +22,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class Profile:
-    """A robot's user."""
+    """One person's."""
 
     name: str
     language: str
@@ -34,30 +31,6 @@ class Profile:
     def describe(self) -> dict[str, Any]:
         """Return the profile as the service gives it."""
         return {**asdict(self), "contacts": [asdict(contact) for contact in self.contacts]}
-
-
-class Profiles:
-    """The profiles of one platform, read when asked for."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def get(self, robot: str) -> Profile:
-        """Return a robot's profile.
-
-        :raises Refused: when there is none
-        :raises Invalid: when its file is broken
-        """
-        path = self._folder / f"{check_name(robot)}.json"
-        if not path.exists():
-            raise Refused(f"cannot find a profile for {robot}: write {path.name} into the platform's profiles")
-        return parse_profile(read_json(path, MAX_BYTES))
-
-    def put(self, robot: str, profile: Profile) -> None:
-        """Keep a robot's profile."""
-        self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        data = strict_json.dumps(profile.describe()).encode()
-        write_whole(self._folder / f"{check_name(robot)}.json", data, mode=0o600)
 
 
 def parse_profile(value: Any) -> Profile:

@@ -21,7 +21,7 @@ from rapp_cloud.catalogue import RobotKind
 from rapp_cloud.database import tables
 from rapp_cloud.database.engine import FILE
 from rapp_cloud.memory import open_memory
-from rapp_cloud.profiles import Contact, Profile, Profiles
+from rapp_cloud.profiles import Contact, Profile
 from rapp_cloud.registrations import Registrations
 from rapp_cloud.robots import Robots
 from rapp_hop.errors import Invalid, Refused
@@ -48,9 +48,11 @@ def _platform(data: Path, url: str | None, tmp_path: Path) -> str:
     shelf = open_shelf(data)
     shelf.create()
     shelf.publish(build(source_folder(tmp_path)))
-    Profiles(data / "profiles").put("nao", Profile("Maria", "en", (Contact("Małgorzata", "m@home.example"),)))
+    (data / "profiles").mkdir()
+    (data / "profiles" / "broken.json").write_text("{")
     with open_memory(data, url) as memory:
         token = memory.accounts.add_robot("nao")
+        memory.people.add("maria", Profile("Maria", "en", (Contact("Małgorzata", "m@home.example"),)), ["nao"])
         memory.reports.keep("nao", {"run": "r-1", "said": "Dzień dobry \x00"})
         memory.audit.add("nao", "install", "hello")
         robots = Robots(lambda: 0.0, lease=1e6)
@@ -81,6 +83,7 @@ def test_what_comes_back_is_what_was_there(database_url: str, other_url: str | N
     assert _content(again, other_url) == before
     with open_memory(again, other_url) as memory:
         assert memory.accounts.name_of(token) == "nao"
+        assert memory.people.profile("nao").contacts == (Contact("Małgorzata", "m@home.example"),)
         assert [run["said"] for run in memory.reports.of("nao")] == ["Dzień dobry \x00"]
         assert memory.audit.check() == 1
         memory.audit.add("nao", "remove", "hello")
@@ -152,7 +155,7 @@ def _spoil(file: Path, damage: str) -> None:
             assert body is not None
             members[member.name] = body.read()
     if damage == "other bytes":
-        members["data/profiles/nao.json"] += b" "
+        members["data/profiles/broken.json"] += b" "
     elif damage == "newer":
         members["rapp-backup.json"] = json.dumps({**json.loads(members["rapp-backup.json"]), "revision": "9999"}).encode()
     elif damage != "symlink":

@@ -104,7 +104,7 @@ def test_init_keeps_secrets_private_and_may_be_repeated(platform: Platform) -> N
     assert platform.command("init", "--data", str(platform.data), "--robot", "nao").returncode == 0
     assert platform.command("init", "--data", str(platform.data), "--robot", "other").returncode == 0
     assert (platform.token, platform.root) == before
-    for path in ("robots/nao.token", "robots/other.token", "platform.sqlite", "keys/root.pem", "profiles/nao.json"):
+    for path in ("robots/nao.token", "robots/other.token", "platform.sqlite", "keys/root.pem"):
         assert (platform.data / path).stat().st_mode & 0o077 == 0
     assert (platform.data / "robots/other.token").read_text() != platform.token
 

@@ -7,23 +7,11 @@ import pytest
 from rapp_cloud.catalogue import RobotKind
 from rapp_cloud.config import load_config
 from rapp_cloud.files import write_whole
-from rapp_cloud.profiles import Contact, Profile, Profiles, parse_profile
+from rapp_cloud.profiles import parse_profile
 from rapp_cloud.robots import Robots
 from rapp_hop.errors import Invalid, Refused
 
 NAO = RobotKind("nao", "1.0")
-
-
-def test_profiles_come_back(tmp_path: Path) -> None:
-    profiles = Profiles(tmp_path / "profiles")
-    profile = Profile("Maria", "en", (Contact("Małgorzata", "m@home.example"),))
-    profiles.put("nao", profile)
-    assert profiles.get("nao") == profile
-    assert profile.describe()["contacts"] == [{"name": "Małgorzata", "address": "m@home.example"}]
-    with pytest.raises(Refused, match="cannot find a profile"):
-        profiles.get("other")
-    with pytest.raises(Invalid):
-        profiles.get("../nao")
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ async def _cloud(config: DemoConfig, sources: Sequence[Path], children: Children
         return foreign_cloud(config.cloud, os.environ)
     data = config.folder / "cloud"
     make_platform(data, ROBOT_NAME)
-    write_profile(data / "profiles" / f"{ROBOT_NAME}.json", {config.recipient: config.address, **CONTACTS})
+    write_profile(data, ROBOT_NAME, {config.recipient: config.address, **CONTACTS})
     rapps = [word for folder in sources for word in ("--publish", str(folder))]
     words = [sys.executable, "-m", "rapp_cloud", "--port", "0", "--data", str(data), *rapps]
     ready = await children.start(Child("cloud", words, os.environ, logs / "cloud.log"))

@@ -96,9 +96,8 @@ def read(options: argparse.Namespace, env: Mapping[str, str], kept: Settings | N
 def _prepare(home: Home, settings: Settings) -> None:
     """Make the platform, offer the RApps of the repository, keep the settings."""
     if settings.cloud is None:
-        profile = _profile(home, settings)
-        if not profile.exists():
-            write_profile(profile, {**RECIPIENT, **CONTACTS})
+        if not (home.cloud / "root.json").exists():
+            write_profile(home.cloud, settings.name, {**RECIPIENT, **CONTACTS})
         make_platform(home.cloud, settings.name)
         shelf = open_shelf(home.cloud, passphrase_from(os.environ))
         with noting_offers(home.cloud, shelf, load_config(home.cloud, {}, os.environ).database):
@@ -209,11 +208,7 @@ def _tell_what_next(home: Home, settings: Settings) -> None:
     for words, what in commands.items():
         print(f"  {home.command(words):<{width}}  {what}")
     if settings.cloud is None:
-        print(f"rapp up: whom it may write to is in {_profile(home, settings)}")
-
-
-def _profile(home: Home, settings: Settings) -> Path:
-    return home.cloud / "profiles" / f"{settings.name}.json"
+        print(f"rapp up: whom it serves, and whom they may write to: {home.command('cloud')} person --help")
 
 
 def _size(path: Path) -> int:

@@ -1,6 +1,6 @@
 """The tables, as the newest migration leaves them; a test holds the two against each other. Times are UTC, seconds since 1970."""
 
-from sqlalchemy import Column, Double, Index, Integer, MetaData, String, Table, Text
+from sqlalchemy import Column, Double, ForeignKey, Index, Integer, MetaData, String, Table, Text
 
 NAME = String(100)
 HASH = String(64)  # SHA-256, hexadecimal
@@ -40,6 +40,43 @@ codes = Table(
     Column("used", Double),
 )
 """One-time codes, by which a robot gets its first token."""
+
+people = Table(
+    "people",
+    metadata,
+    Column("person", NAME, primary_key=True),
+    Column("name", String(100), nullable=False),
+    Column("language", String(16), nullable=False),
+)
+"""The persons of a home: by the name of their account, what they are called and speak."""
+
+contacts = Table(
+    "contacts",
+    metadata,
+    Column("person", NAME, ForeignKey("people.person", ondelete="CASCADE"), primary_key=True),
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    Column("name", String(100), nullable=False),
+    Column("address", String(320), nullable=False),
+)
+"""Whom a person writes to, in their order."""
+
+served = Table(
+    "served",
+    metadata,
+    Column("robot", NAME, primary_key=True),
+    Column("person", NAME, ForeignKey("people.person", ondelete="CASCADE"), primary_key=True),
+    Column("number", Integer, nullable=False),
+)
+"""Whom a robot serves; the lowest number is the one it takes to be present."""
+
+calls = Table(
+    "calls",
+    metadata,
+    Column("token", String(12), primary_key=True),
+    Column("day", Integer, primary_key=True, autoincrement=False),
+    Column("calls", Integer, nullable=False),
+)
+"""How often a token with a quota (by its id) has called on a day (since 1970, UTC)."""
 
 marks = Table("marks", metadata, Column("name", NAME, primary_key=True), Column("value", Integer, nullable=False))
 """Numbers that grow with every change of something, so that other processes see it cheaply."""
