@@ -14,19 +14,30 @@ class Agent(DynamicAgent):
 {body}
 """
 
+JAVASCRIPT = """const rapp = require("rapp_api");
+const {{ cloud, communication, navigation, vision, keepsakes }} = rapp;
+
+module.exports = class Agent extends rapp.DynamicAgent {{
+  async execute() {{
+{body}
+  }}
+}};
+"""
+
 
 def write_rapp(
     folder: Path, name: str, body: str = "pass", keywords: tuple[str, ...] = (), version: str = "1.0.0", **rapp: Any
 ) -> Path:
     """A package whose dynamic agent executes `body`; gives its folder."""
     folder.mkdir(parents=True)
+    entry, program = _program(rapp.get("runtime", "python3"), body)
     manifest = {
         "name": name,
         "version": version,
         "description": "made for a test",
         "rapp": {
             "agent": "dynamic",
-            "entry": "agent.py",
+            "entry": entry,
             "runtime": "python3",
             "keywords": {"en": list(keywords or (name,))},
             "sentences": {"en": [f"please run {name}"]},
@@ -37,9 +48,15 @@ def write_rapp(
         },
     }
     (folder / "package.json").write_text(json.dumps(manifest))
-    indented = "\n".join(f"        {line}" for line in body.splitlines())
-    (folder / "agent.py").write_text(AGENT.format(body=indented))
+    (folder / entry).write_text(program)
     return folder
+
+
+def _program(runtime: str, body: str) -> tuple[str, str]:
+    """Name and text of the file of a dynamic agent that executes `body`."""
+    if runtime == "javascript":
+        return "agent.js", JAVASCRIPT.format(body=body)
+    return "agent.py", AGENT.format(body="\n".join(f"        {line}" for line in body.splitlines()))
 
 
 def install_rapp(home: Path, name: str, body: str = "pass", **rapp: Any) -> Path:

@@ -23,6 +23,7 @@ from rapp_bridge.errors import Invalid
 from rapp_bridge.node import join
 
 THREADS = 8  # for what asks the master, and for pictures
+GUEST_THREADS = 2  # it has one client, and shares the limits of a sandbox
 LEAVE = 0.7  # s for each part of the end
 SOCKETS = 2  # descriptors for each client, at most: its own, and its share of those to nodes
 
@@ -77,7 +78,7 @@ async def _serve(config: Config, gate: Gate, tls: ssl.SSLContext | None) -> None
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stop.set)
-    blocking = Blocking(THREADS)
+    blocking = Blocking(GUEST_THREADS if config.guest else THREADS)
     bridge = Bridge(config, gate, blocking)
     await bridge.door.open()
     joining = asyncio.create_task(blocking.run(join, bridge.door, bridge.connect))

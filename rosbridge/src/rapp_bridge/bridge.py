@@ -1,7 +1,9 @@
 """The bridge put together: ROS on one side, clients on the other."""
 
 import asyncio
+import socket
 import ssl
+from typing import Any
 
 import rosgraph
 import rospy
@@ -45,32 +47,43 @@ class Bridge:
         self._rosapi = Rosapi(Graph(config, master, blocking, name), master, blocking)
         self._presence = Presence(self._publications)
         ros = Ros(config, self._publications, self._subscriptions, self._calls, self._offers, self._own)
-        self._hall = Hall(config, ros, gate, rospy.resolve_name, blocking.background, self._presence.changed)
+        changed = _nothing if config.guest else self._presence.changed
+        self._hall = Hall(config, ros, gate, rospy.resolve_name, blocking.background, changed)
+        self._rejoining: Rejoining | None = None
         self.door = Door(self._publications, self._own)
         self.connect = self._subscriptions.connect
 
     async def open(self, tls: ssl.SSLContext | None) -> int:
         """Offer the bridge's own services and topics, and serve clients; gives the port. ROS has been joined."""
-        await self._rosapi.offer(self._own)
-        await self._presence.begin(self._hall)
-        loop, config = asyncio.get_running_loop(), self._config
-        self._server = await loop.create_server(
+        config = self._config
+        if not config.guest:
+            await self._rosapi.offer(self._own)
+            await self._presence.begin(self._hall)
+        self._server = await self._listen(tls)
+        port: int = self._server.sockets[0].getsockname()[1]
+        if not config.guest:
+            await self._blocking.run(rospy.set_param, "~actual_port", port)
+            self._rejoining = Rejoining()
+        self._sweeping = asyncio.create_task(self._sweep())
+        return port
+
+    async def _listen(self, tls: ssl.SSLContext | None) -> asyncio.Server:
+        config = self._config
+        place: dict[str, Any] = {"host": config.address, "port": config.port}
+        if config.listener >= 0:
+            place = {"sock": socket.socket(fileno=config.listener)}
+        return await asyncio.get_running_loop().create_server(
             lambda: Doorway(self._hall),
-            config.address,
-            config.port,
             ssl=tls,
             backlog=CLIENT_BACKLOG,
             ssl_handshake_timeout=config.entry_timeout if tls else None,
+            **place,
         )
-        port: int = self._server.sockets[0].getsockname()[1]
-        await self._blocking.run(rospy.set_param, "~actual_port", port)
-        self._sweeping = asyncio.create_task(self._sweep())
-        self._rejoining = Rejoining()
-        return port
 
     async def close(self, seconds: float) -> None:
         """End all connections; what clients held is given up, as far as that takes no longer than so many seconds."""
-        self._rejoining.close()
+        if self._rejoining is not None:
+            self._rejoining.close()
         self._sweeping.cancel()
         self._server.close()
         self._offers.close()
@@ -93,3 +106,7 @@ class Bridge:
             self._calls.sweep()
             await self._publications.sweep()
             await self._subscriptions.sweep()
+
+
+def _nothing() -> None:
+    """Nobody is told of a guest's clients."""

@@ -11,6 +11,8 @@ class Config:
 
     address: str = "127.0.0.1"
     port: int = 9090  # 0: any free one
+    listener: int = -1  # descriptor of a socket that listens already, in place of address and port
+    guest: bool = False  # in a ROS where it may offer nothing of its own: no rosapi, no word of who is connected
     certfile: str = ""  # PEM file for TLS; empty: none
     keyfile: str = ""  # PEM file; empty: in the certificate's file
     access_file: str = ""  # tokens and what they open; empty: everybody may do everything
@@ -41,6 +43,8 @@ def read(words: Sequence[str], env: Mapping[str, str]) -> Config:
     parser = argparse.ArgumentParser(prog="rosbridge", description="rosbridge v2 WebSocket server")
     parser.add_argument("--address", default=default.address, help="where to listen (%(default)s)")
     parser.add_argument("--port", type=int, default=env.get("RAPP_BRIDGE_PORT", default.port), help="0: any free one")
+    parser.add_argument("--listener", type=int, default=-1, metavar="FD", help="socket that listens already, in their place")
+    parser.add_argument("--guest", action="store_true", help="offer no services, topics and parameters of the bridge's own")
     parser.add_argument("--certfile", default="", help="PEM file of the certificate: listen with TLS (wss://)")
     parser.add_argument("--keyfile", default="", help="PEM file of its key, when it is not in the same file")
     parser.add_argument("--access-file", default="", help="TOML file of tokens: clients have to authenticate")

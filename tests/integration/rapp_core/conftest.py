@@ -1,6 +1,8 @@
 """A launcher with real sandboxes, and what a RApp inside one found out."""
 
 import json
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -44,11 +46,18 @@ class Workshop:
         self._runs: list[Run] = []
         self._count = 0
 
-    def start(self, body: str, core: Sequence[str] = ("rapp_say",)) -> Run:
+    def start(self, body: str, core: Sequence[str] = ("rapp_say",), runtime: str = "python3") -> Run:
         """Activate a RApp whose `execute` is `body`, which may use these core services, and wait for its first word."""
+        return self.activate(self.write(body, core, runtime))
+
+    def write(self, body: str, core: Sequence[str] = ("rapp_say",), runtime: str = "python3") -> Path:
+        """The package of such a RApp."""
         self._count += 1
-        permissions = {"core": list(core), "cloud": []}
-        package = write_rapp(self.folder / f"package{self._count}", f"probe{self._count}", body, permissions=permissions)
+        name, permissions = f"probe{self._count}", {"core": list(core), "cloud": []}
+        return write_rapp(self.folder / f"package{self._count}", name, body, permissions=permissions, runtime=runtime)
+
+    def activate(self, package: Path) -> Run:
+        """Activate a package, and wait for its first word."""
         run = self.launcher.activate(package, self.heard.append)
         self._runs.append(run)
         wait_for(lambda: run.first_word.is_set() or run.outcome is not None or not run.alive)
@@ -74,6 +83,29 @@ class Workshop:
         for run in self._runs:
             run.end(0.0)
         self.launcher.close()
+
+
+class Core:
+    """The node in the core agent's place."""
+
+    def __init__(self, notes: Path, ros_env: dict[str, str]) -> None:
+        self._notes = notes
+        words = [sys.executable, str(Path(__file__).with_name("gated_core.py")), str(notes)]
+        self.process = subprocess.Popen(words, env=ros_env, stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        assert self.process.stdout.readline().startswith("READY")
+
+    def notes(self, name: str) -> list[dict[str, Any]]:
+        lines = self._notes.read_text().splitlines() if self._notes.exists() else []
+        return [note for note in map(json.loads, lines) if note["name"] == name]
+
+
+@pytest.fixture(scope="module")
+def core(ros_env: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Core]:
+    core = Core(tmp_path_factory.mktemp("core") / "notes", ros_env)
+    yield core
+    core.process.terminate()
+    core.process.communicate(timeout=PATIENCE)
 
 
 @pytest.fixture

@@ -38,6 +38,9 @@ def serve(name: str, srv: str) -> rospy.Service:
 
 
 def walk(goal: Any) -> None:
+    answers = (server.action_server.feedback_pub, server.action_server.result_pub)
+    while not all(each.get_num_connections() for each in answers) and not stop.wait(0.02):
+        pass  # roslib's client sends its goal before it can hear the answers
     server.publish_feedback(rapp_msgs.msg.MoveToFeedback())
     server.set_succeeded(rapp_msgs.msg.MoveToResult(success=True))
 
@@ -49,6 +52,7 @@ rospy.init_node("core_agent", disable_signals=True, disable_rosout=True)
 for each in ("rapp_say", "rapp_hop/secret"):
     serve(each, "Say")
 serve("rapp_keep", "Keep")
+serve("rapp_rest", "Rest")
 server = SimpleActionServer("rapp_move_to", rapp_msgs.msg.MoveToAction, walk, auto_start=False)
 rospy.Subscriber("rapp_move_to/goal", rapp_msgs.msg.MoveToActionGoal, lambda m: note("goal", m._connection_header))
 state = rospy.Publisher("~state", String, queue_size=1, latch=True)

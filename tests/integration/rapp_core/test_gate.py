@@ -1,15 +1,12 @@
 """The gate between real sandboxes and a real ROS: what passes, what does not, and what is left of it (DESIGN section 3.6)."""
 
-import json
 import os
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -37,29 +34,6 @@ from rapp_msgs.srv import Say
 rospy.wait_for_service("rapp_say", 9)
 print(rospy.ServiceProxy("rapp_say", Say)("x", "en").success)
 """
-
-
-class Core:
-    """The node in the core agent's place."""
-
-    def __init__(self, notes: Path, ros_env: dict[str, str]) -> None:
-        self._notes = notes
-        words = [sys.executable, str(Path(__file__).with_name("gated_core.py")), str(notes)]
-        self.process = subprocess.Popen(words, env=ros_env, stdout=subprocess.PIPE, text=True)
-        assert self.process.stdout is not None
-        assert self.process.stdout.readline().startswith("READY")
-
-    def notes(self, name: str) -> list[dict[str, Any]]:
-        lines = self._notes.read_text().splitlines() if self._notes.exists() else []
-        return [note for note in map(json.loads, lines) if note["name"] == name]
-
-
-@pytest.fixture(scope="module")
-def core(ros_env: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Core]:
-    core = Core(tmp_path_factory.mktemp("core") / "notes", ros_env)
-    yield core
-    core.process.terminate()
-    core.process.communicate(timeout=PATIENCE)
 
 
 def graph(roscore: str) -> str:

@@ -22,7 +22,7 @@ MAX_WORD = 64  # characters of a keyword
 MAX_SENTENCE = 200  # characters
 MAX_LANGUAGES = 32
 MAX_PER_LANGUAGE = 64  # keywords or sentences
-RUNTIMES = ("python3",)
+RUNTIMES = ("python3", "javascript")  # of dynamic agents; cloud agents are Python
 _RAPP_KEYS = {"agent", "entry", "runtime", "keywords", "sentences", "permissions", "partner", "needs", "parameters"}
 
 # The core agent's services, deliverable §4.5 in the names of DESIGN §3.1, and `keep`: what a RApp may ask to use.
@@ -114,6 +114,8 @@ def _check_kind(manifest: Manifest) -> None:
         raise Invalid("cannot use rapp.partner in package.json: it must name another package, such as NAME_cloud")
     if manifest.agent == "cloud" and (manifest.keywords or manifest.sentences or manifest.permissions.core):
         raise Invalid("cannot read package.json: a cloud agent has no keywords, no sentences and no permissions.core")
+    if manifest.agent == "cloud" and manifest.runtime != "python3":
+        raise Invalid(f"cannot use rapp.runtime {manifest.runtime!r} of a cloud agent: write python3")
 
 
 def reasons_against(manifest: Manifest, kind: str, api: str) -> list[str]:

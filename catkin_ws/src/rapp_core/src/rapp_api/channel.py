@@ -47,6 +47,6 @@ class SocketChannel:
             line = self._lines.readline(LONGEST)
             message = json.loads(line) if line else None
         except (OSError, ValueError) as error:
-            _log.error("cannot understand the core agent: %s", error)
+            _log.error("cannot understand the other end: %s", error)
             return None
         return message if isinstance(message, dict) and "type" in message else None

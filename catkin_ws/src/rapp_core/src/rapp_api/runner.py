@@ -14,7 +14,7 @@ from types import FrameType
 
 import rospy
 
-from rapp_api import core_agent
+from rapp_api import core_agent, javascript
 from rapp_api.channel import SocketChannel
 from rapp_api.gate import hand_over_if_guarded
 from rapp_api.life import Bounds, live
@@ -39,7 +39,11 @@ def _run(end: socket.socket) -> None:
     logging.basicConfig(level=logging.INFO, format=LOG_FORMAT, stream=sys.stderr, force=True)  # rospy has put in its own
     channel.send(type="ready")
     order = channel.receive()
-    if order is not None and order["type"] == "activate":
+    if order is not None and order.get("runtime") == javascript.RUNTIME:
+        status = javascript.live(channel, order, _lost, Bounds())
+        if status != 0:
+            _exit(status)
+    elif order is not None and order["type"] == "activate":
         core_agent.use(RosCoreAgent(order.get("token", "")))
         live(channel, order, _lost, Bounds())
     elif order is not None:

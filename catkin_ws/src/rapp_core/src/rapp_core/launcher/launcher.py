@@ -18,6 +18,7 @@ from rapp_core.launcher.channel import Channel
 from rapp_core.launcher.confined import Confined, adopt_orphans
 from rapp_core.launcher.gate import Gate
 from rapp_core.launcher.run import Run
+from rapp_core.launcher.runtimes import check_runtime
 from rapp_core.launcher.sandbox import INSIDE_PRIVATE, RunFolders, command
 from rapp_core.manifest import Manifest, read_manifest
 from rapp_core.ports import Told
@@ -68,8 +69,9 @@ class Launcher:
             _log.error("%s", error)
 
     def activate(self, package: Path, told: Told) -> Run:
-        """Run the package as a dynamic agent; gives its run. Raises Invalid, Unreachable, Bug."""
+        """Run the package as a dynamic agent; gives its run. Raises Refused, Invalid, Unreachable, Bug."""
         manifest = read_manifest(package)
+        check_runtime(manifest)
         run = self._take()
         try:
             _copy(package, run.folders.package)

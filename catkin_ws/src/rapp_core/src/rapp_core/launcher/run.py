@@ -97,6 +97,7 @@ class Run:
             run=self.name,
             package=INSIDE_PACKAGE,
             entry=manifest.entry,
+            runtime=manifest.runtime,
             parameters=manifest.parameters,
             cloud_agent=manifest.partner is not None,
         )

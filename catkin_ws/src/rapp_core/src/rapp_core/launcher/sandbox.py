@@ -20,6 +20,8 @@ NOBODY = "65534"
 SYSTEM = ("/usr", "/etc/alternatives", "/etc/hosts", "/etc/ld.so.cache", "/etc/nsswitch.conf", "/etc/localtime")
 RUNNER = "rapp_api.runner"
 PACKAGES = ("rapp_api", "rapp_agent", "rapp_msgs")
+BRIDGE = "rapp_bridge"  # of RApps in other languages; not imported here
+INSIDE_JAVASCRIPT = "/rapp/node_modules/rapp_api"  # where node finds it from the package's folder
 INSIDE_PRIVATE = "/rapp/private"
 
 
@@ -55,6 +57,7 @@ def command(folders: RunFolders, limits: Limits, environment: dict[str, str]) ->
     """The words that start the runner inside the sandbox. Raises Bug when the Python packages cannot be found."""
     recordings = str(folders.recordings)
     read_only = [(path, path) for path in (*SYSTEM, *_python())]
+    read_only += [(str(_source("rapp_api") / "js"), INSIDE_JAVASCRIPT)]
     read_only += [(str(folders.package), INSIDE_PACKAGE), (recordings, recordings)]
     words = ["bwrap", "--die-with-parent", "--new-session"]
     words += ["--unshare-ipc", "--unshare-net", "--unshare-pid", "--unshare-uts", "--unshare-cgroup-try"]
@@ -82,13 +85,27 @@ def _parents(paths: Iterable[str]) -> list[str]:
 def _python() -> list[str]:
     """The virtual environment and the folders that hold the packages a dynamic agent imports."""
     found = {sys.prefix}
-    for name in PACKAGES:
-        spec = importlib.util.find_spec(name)
-        if spec is None or spec.origin is None:
-            raise Bug(f"cannot make a sandbox: package {name} is not installed here; run ./rapp help to set up")
-        init = Path(spec.origin)
-        found |= {str(init.parent.parent), str(init.resolve().parent.parent)}  # catkin links files from elsewhere
+    for name in (*PACKAGES, *([BRIDGE] if is_here(BRIDGE) else [])):
+        found |= {str(_folder(name).parent), str(_source(name).parent)}
     return sorted(path for path in found if not path.startswith("/usr/"))
+
+
+def is_here(name: str) -> bool:
+    """Whether a Python package is installed here."""
+    return importlib.util.find_spec(name) is not None
+
+
+def _folder(name: str) -> Path:
+    """Where a Python package is. Raises Bug."""
+    spec = importlib.util.find_spec(name)
+    if spec is None or spec.origin is None:
+        raise Bug(f"cannot make a sandbox: package {name} is not installed here; run ./rapp help to set up")
+    return Path(spec.origin).parent
+
+
+def _source(name: str) -> Path:
+    """Where a Python package's files are: catkin links them from elsewhere. Raises Bug."""
+    return (_folder(name) / "__init__.py").resolve().parent
 
 
 def _unprivileged(account: int | None) -> list[str]:

@@ -1,0 +1,60 @@
+// Service calls over rosbridge (protocol v2, section 3.4.6).
+"use strict";
+
+const { WebSocket } = require("ws"); // Debian's node-ws
+const { failure } = require("./core.js");
+const { Unreachable } = require("./errors.js");
+
+const LONGEST_CALL = 3600; // s; longer than any service takes: recording and listening end after 300 s
+const LARGEST = 64 * 1024 * 1024; // bytes of one message
+
+class Bridge {
+  #socket = null;
+  #open = new Map(); // calls without an answer, by id
+  #count = 0;
+
+  /** Connect; rejects with Unreachable. */
+  connect(url) {
+    this.#socket = new WebSocket(url, { maxPayload: LARGEST, perMessageDeflate: false });
+    this.#socket.on("message", (data) => this.#take(JSON.parse(data)));
+    this.#socket.on("close", () => this.#lost());
+    return new Promise((resolve, reject) => {
+      this.#socket.once("open", resolve);
+      this.#socket.on("error", (error) => reject(new Unreachable(`cannot reach rosbridge at ${url}: ${error.message}`)));
+    });
+  }
+
+  /** Call a ROS service; gives its response. Rejects with a RappError. */
+  call(service, args) {
+    if (this.#socket?.readyState !== WebSocket.OPEN) {
+      return Promise.reject(new Unreachable(`cannot call ${service}: rosbridge is gone`));
+    }
+    const id = `rapp_api:${(this.#count += 1)}`;
+    return new Promise((resolve, reject) => {
+      this.#open.set(id, { service, resolve, reject });
+      this.#socket.send(JSON.stringify({ op: "call_service", id, service, args, timeout: LONGEST_CALL }));
+    });
+  }
+
+  #take(message) {
+    const call = this.#open.get(message.id);
+    if (message.op !== "service_response" || call === undefined) {
+      return;
+    }
+    this.#open.delete(message.id);
+    if (message.result) {
+      call.resolve(message.values);
+    } else {
+      call.reject(failure(call.service, String(message.values)));
+    }
+  }
+
+  #lost() {
+    for (const { service, reject } of this.#open.values()) {
+      reject(new Unreachable(`cannot wait for ${service}: rosbridge has gone`));
+    }
+    this.#open.clear();
+  }
+}
+
+module.exports = { Bridge };

@@ -1,0 +1,235 @@
+"""RApps in JavaScript in real sandboxes, behind real gates: what they can and cannot do, how they end (DESIGN section 3.6)."""
+
+import json
+import os
+import shutil
+import signal
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+from fakes.processes import ended
+from fakes.roslibjs import install_roslib
+from rapp_ros.master import ask
+
+MOVER = ("rapp_say", "rapp_move_to")
+FOREVER = "await new Promise(() => {});"
+ATTEMPT = """
+const attempt = async (work) => {
+  try { return ["did", await work()]; } catch (error) { return [error.name, error.message]; }
+};
+const { WebSocket } = require("ws");
+const wire = new WebSocket("ws://127.0.0.1:9090");
+const came = [];
+const answers = new Map();
+wire.on("message", (data) => {
+  const message = JSON.parse(data);
+  if (message.op === "service_response") answers.get(message.id)(message); else came.push(message);
+});
+await new Promise((resolve) => wire.once("open", resolve));
+const send = (message) => wire.send(JSON.stringify(message));
+const ask = (service, args = {}, id = service) => new Promise((resolve) => {
+  answers.set(id, resolve);
+  send({ op: "call_service", id, service, args });
+});
+let facts;
+"""
+MODULE = """
+import { DynamicAgent } from "rapp_api";
+export default class extends DynamicAgent { execute() { console.log("module"); } }
+"""
+
+
+@pytest.fixture(scope="module")
+def roslibjs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return install_roslib(tmp_path_factory.mktemp("npm") / "roslibjs")
+
+
+def told(workshop: Any, body: str, core: tuple[str, ...] = ("rapp_say",)) -> tuple[Any, Any, str]:
+    """The `facts` that `body` has found out from inside a sandbox, its run, and all it has printed."""
+    body = f"{ATTEMPT}{body}\nconsole.log('FACTS ' + JSON.stringify(facts));"
+    run = workshop.start(body, core, "javascript")
+    text, outcome = workshop.finish(run)
+    assert outcome == "done", text
+    return json.loads(next(line for line in text.splitlines() if line.startswith("FACTS "))[6:]), run, text
+
+
+def graph(roscore: str) -> str:
+    return str(ask(roscore, 20.0, "getSystemState", "/test")[2])
+
+
+def test_a_run_from_first_word_to_gone(workshop, core):
+    """Its calls come under the run's name and with the lease's secret, of which it knows nothing."""
+    body = """
+await communication.textToSpeech("hello", "pl");
+facts = [await keepsakes.keep("kept.txt", "text"), process.env];
+"""
+    _, run, text = told(workshop, body, ("rapp_say", "rapp_keep"))
+    kinds = [message["type"] for message in workshop.heard if message["type"] != "state"]
+    assert kinds == ["activate", "first_word", "terminate", "gone"]
+    states = [m["state"] for m in workshop.heard if m["type"] == "state" and m["kind"] == "entered"]
+    assert states == ["s1", "s2", "s3", "execute", "s4", "s5"]
+    for note in (core.notes("rapp_say")[-1], core.notes("rapp_keep")[-1]):
+        assert note["caller"] == f"/dynamic_agent_{run.name}"
+        assert note["secret"] == run.token
+    assert core.notes("rapp_keep")[-1]["size"] == len("text")
+    assert run.token not in text
+
+
+def test_what_package_json_does_not_name_is_refused(workshop, core):
+    """By rapp_api, and by the protocol: a core service, one of the robot's own, rosapi, and what only looks like it."""
+    body = """
+const names = ["rapp_rest", "/rapp_hop/secret", "/rosapi/topics", "rosapi/nodes", "/core_agent/get_loggers"];
+facts = {
+  said: await attempt(() => navigation.rest()),
+  off: [await attempt(() => communication.textToSpeech()), await attempt(() => communication.textToSpeech(["a"]))],
+  asked: await Promise.all(names.map((name) => ask(name))),
+};
+"""
+    facts, _, _ = told(workshop, body)
+    refusal = "cannot call /rapp_rest: the RApp's package.json does not name it under permissions.core"
+    assert facts["said"] == ["Refused", refusal]
+    assert [name for name, _ in facts["off"]] == ["Invalid", "Invalid"]
+    assert [answer["result"] for answer in facts["asked"]] == [False] * len(facts["asked"])
+    assert core.notes("rapp_hop/secret") == core.notes("rapp_rest") == []
+
+
+def test_topics_and_ports_of_the_robot_are_out_of_reach(workshop, core, roscore):
+    """Nothing of another's is heard, published, offered, set or withdrawn; its own loopback has nothing of the robot's."""
+    before = graph(roscore)
+    port = urlsplit(roscore).port
+    body = f"""
+const net = require("node:net");
+const reach = (port, host = "127.0.0.1") => new Promise((resolve) => {{
+  const socket = net.connect({{ port, host }}, () => resolve("reached"));
+  socket.on("error", (error) => resolve(error.code));
+}});
+send({{ op: "subscribe", topic: "/core_agent/state", type: "std_msgs/String" }});
+send({{ op: "subscribe", topic: "/rapp_move_to/goal", type: "rapp_msgs/MoveToActionGoal" }});
+send({{ op: "publish", topic: "/core_agent/state", msg: {{ data: "mine" }} }});
+send({{ op: "advertise", topic: "/rapp_hop/cancel", type: "std_msgs/String" }});
+send({{ op: "publish", topic: "/rapp_hop/cancel", msg: {{ data: "1" }} }});
+send({{ op: "advertise_service", service: "/rapp_say", type: "rapp_msgs/Say" }});
+send({{ op: "unadvertise_service", service: "/rapp_say" }});
+await ask("rapp_say", {{ text: "after it all", language: "" }});
+facts = {{
+  heard: came.filter((message) => message.op === "publish"),
+  ports: [await reach({port}), await reach(9559), await reach(22), await reach(80, "192.0.2.1")],
+}};
+"""
+    facts, run, _ = told(workshop, body)
+    assert facts["heard"] == []
+    assert facts["ports"] == ["ECONNREFUSED"] * 3 + ["ENETUNREACH"]
+    assert core.notes("rapp_say")[-1]["caller"] == f"/dynamic_agent_{run.name}"
+    assert graph(roscore) == before
+
+
+def test_plain_roslib_calls_services_and_sends_goals(workshop, core, roslibjs):
+    body = """
+const ROSLIB = await import("roslib");
+const ros = new ROSLIB.Ros({ url: "ws://127.0.0.1:9090" });
+await new Promise((resolve) => ros.on("connection", resolve));
+const say = new ROSLIB.Service({ ros, name: "/rapp_say", serviceType: "rapp_msgs/Say" });
+const said = await new Promise((resolve, reject) => say.callService({ text: "by roslib", language: "en" }, resolve, reject));
+const client = new ROSLIB.ActionClient({ ros, serverName: "/rapp_move_to", actionName: "rapp_msgs/MoveToAction" });
+const goal = new ROSLIB.Goal({ actionClient: client, goalMessage: { x: 1, y: 0, theta: 0 } });
+let feedback = 0;
+goal.on("feedback", () => { feedback += 1; });
+const result = new Promise((resolve) => goal.on("result", resolve));
+goal.send();
+console.log("FACTS " + JSON.stringify([said.success, (await result).success, feedback]));
+"""
+    package = workshop.write(body, MOVER, "javascript")
+    shutil.copytree(roslibjs / "node_modules", package / "node_modules")
+    run = workshop.activate(package)
+    text, outcome = workshop.finish(run)
+    assert outcome == "done", text
+    assert "FACTS [true,true,1]" in text
+    goal = core.notes("goal")[-1]
+    assert (goal["caller"], goal["secret"]) == (f"/dynamic_agent_{run.name}", run.token)
+
+
+@pytest.mark.parametrize(
+    ("program", "detail"),
+    [
+        ("throw new TypeError('on purpose');", "TypeError: on purpose"),
+        ("Promise.reject(new RangeError('left alone')); await this.pause(60);", "RangeError: left alone"),
+        ("}} this is no program {{", "SyntaxError"),
+    ],
+)
+def test_a_program_that_fails_says_how(workshop, wait_for, program, detail):
+    run = workshop.start(program, runtime="javascript")
+    wait_for(lambda: run.outcome is not None)
+    assert run.outcome[0] == "failed"
+    assert run.outcome[1].startswith(detail)
+    assert workshop.finish(run)[1] == "failed"
+
+
+def test_an_es_module_is_a_rapp_too(workshop):
+    package = workshop.write("", runtime="javascript")
+    (package / "agent.mjs").write_text(MODULE)
+    manifest = (package / "package.json").read_text()
+    (package / "package.json").write_text(manifest.replace("agent.js", "agent.mjs"))
+    text, outcome = workshop.finish(workshop.activate(package))
+    assert (outcome, "module" in text) == ("done", True), text
+
+
+# ends that are none
+
+
+def inside_of(run: Any) -> list[int]:
+    """All processes of a run's sandbox."""
+
+    def namespace(pid: int) -> Path | None:
+        try:
+            return Path(f"/proc/{pid}/ns/pid").readlink()
+        except OSError:
+            return None
+
+    own = namespace(run._process.first)
+    return [pid for pid in (int(each.name) for each in Path("/proc").glob("[0-9]*")) if namespace(pid) == own]
+
+
+def test_a_crash_is_seen_and_leaves_no_process(workshop, wait_for):
+    run = workshop.start("await this.pause(0.5); process.exit(7);", runtime="javascript")
+    inside = inside_of(run)
+    wait_for(lambda: not run.alive)
+    run.end(0.0)
+    assert run.status == 7
+    wait_for(lambda: all(ended(pid) for pid in inside))
+
+
+def test_an_event_loop_that_stands_still_beats_on_but_does_not_count_and_is_ended(workshop, wait_for):
+    body = "process.on('SIGTERM', () => {}); console.log('asleep'); await this.pause(0.5); while (true) {}"
+    run = workshop.start(body, runtime="javascript")
+    wait_for(lambda: "asleep" in run.folders.log.read_text())
+    inside = inside_of(run)
+    assert len(inside) >= 4  # bubblewrap's first process, the runner, rosbridge, node
+    wait_for(lambda: run.heartbeat - run.progress > 1.5)
+    run.end(0.2)
+    wait_for(lambda: all(ended(pid) for pid in inside))
+
+
+def test_a_rapp_that_prints_without_end_is_stopped_by_its_limit(workshop, wait_for):
+    run = workshop.start("while (true) { console.log('x'.repeat(100_000)); await null; }", runtime="javascript")
+    wait_for(lambda: run.outcome is not None or not run.alive)
+    assert run.folders.log.stat().st_size <= workshop.config.limits.file_size
+    run.end(0.0)
+
+
+@pytest.mark.parametrize("fault", ["rosbridge", "node"])
+def test_a_part_that_stands_still_or_dies_is_no_way_to_stay(workshop, wait_for, fault):
+    run = workshop.start(FOREVER, runtime="javascript")
+    inside = inside_of(run)
+    victim = next(pid for pid in inside if (b"rapp_bridge" if fault == "rosbridge" else b"runner.js") in command(pid))
+    os.kill(victim, signal.SIGKILL if fault == "rosbridge" else signal.SIGSTOP)
+    if fault == "node":
+        wait_for(lambda: run.heartbeat - run.progress > 1.5)
+    run.end(0.2)
+    wait_for(lambda: all(ended(pid) for pid in inside))
+
+
+def command(pid: int) -> bytes:
+    return Path(f"/proc/{pid}/cmdline").read_bytes()
