@@ -81,7 +81,7 @@ async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Me
     metrics = _metrics(robots, agents, tls_files)
     checks = checks_of(memory, config.data, shelf.metadata / "timestamp.json", tls_files[0] if tls_files else None)
     registry = _registry(config, shelf, workers, robots, agents, memory)
-    admit = Turnstile(memory.accounts, time.monotonic).admit
+    admit = Turnstile(memory.accounts, memory.quotas, time.monotonic).admit
     server = MeasuredServer(metrics, admit, registry, doors.caller, config.data / "uploads", [
         *entrance(memory.admission, memory.audit),
         *health(checks, metrics, memory.accounts.name_of),

@@ -12,12 +12,13 @@ from rapp_cloud.admission import Admission
 from rapp_cloud.audit import Audit
 from rapp_cloud.database.engine import FILE, Database
 from rapp_cloud.people import People
+from rapp_cloud.quotas import Quotas
 from rapp_cloud.registrations import Registrations
 from rapp_cloud.reports import Reports
 from rapp_cloud.robots import Robots
 from rapp_hop.errors import HopError
 
-STEP = 0.5  # seconds in which the process sees what a command has changed, and in which leases are written
+STEP = 0.5  # seconds in which the process sees what a command has changed, and in which leases and counts are written
 _log = logging.getLogger(__name__)
 
 
@@ -29,6 +30,7 @@ class Memory:
         self.accounts = Accounts(database)
         self.admission = Admission(self.accounts)
         self.people = People(self.accounts)
+        self.quotas = Quotas(database)
         self.audit = Audit(database, folder)
         self.reports = Reports(database)
 
@@ -49,11 +51,12 @@ def open_memory(data: Path, url: str | None = None) -> Iterator[Memory]:
 
 @asynccontextmanager
 async def remembering(data: Path, url: str | None, robots: Robots) -> AsyncIterator[Memory]:
-    """`open_memory` for a process that serves: tokens, people, leases stay in step with the database meanwhile."""
+    """`open_memory` for a process that serves: tokens, people, leases, quotas stay in step with the database meanwhile."""
     memory = await asyncio.to_thread(_open, data, url)
     registrations, stop = Registrations(memory.database, robots), asyncio.Event()
     try:
         await asyncio.to_thread(registrations.load)
+        await asyncio.to_thread(memory.quotas.load)
         stepping = asyncio.create_task(_keep_in_step(memory, registrations, stop))
         try:
             yield memory
@@ -94,6 +97,7 @@ async def _keep_in_step(memory: Memory, registrations: Registrations, stop: asyn
             await asyncio.to_thread(memory.accounts.refresh)
             await asyncio.to_thread(memory.people.refresh)
             await asyncio.to_thread(registrations.write)
+            await asyncio.to_thread(memory.quotas.write)
             await asyncio.to_thread(memory.audit.write)
             well = True
         except HopError as error:

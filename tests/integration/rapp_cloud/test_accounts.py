@@ -27,7 +27,8 @@ from rapp_cloud.admission import LOGIN, Admission
 from rapp_cloud.database import tables
 from rapp_cloud.database.engine import Database
 from rapp_cloud.memory import open_memory
-from rapp_cloud.turnstile import DAY, Turnstile
+from rapp_cloud.quotas import DAY, Quotas
+from rapp_cloud.turnstile import Turnstile
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Refused, Unreachable
 from rapp_hop.hz.delivery import Delivery
@@ -156,7 +157,7 @@ def test_o07_a_change_to_winter_time_moves_no_end(accounts: Accounts, clock: Clo
 
 def test_scopes_rates_and_quotas(accounts: Accounts, clock: Clock) -> None:
     monotonic = [0.0]
-    turnstile = Turnstile(accounts, lambda: monotonic[0])
+    turnstile = Turnstile(accounts, Quotas(accounts.database, clock), lambda: monotonic[0])
     accounts.add_robot("nao")
     accounts.open("maria", "user")
     reader, slow, few = accounts.give("maria"), accounts.give("nao", rate=2.0), accounts.give("nao", quota=3)
