@@ -42,8 +42,9 @@ def desk(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest
     return Desk(tmp_path / "cloud", capsys)
 
 
-def test_a_new_rapp_is_published_shown_and_yanked(desk: Desk, tmp_path: Path) -> None:
-    assert main(["new", "my_first"]) == 0
+@pytest.mark.parametrize("language", [[], ["--javascript"]])
+def test_a_new_rapp_is_published_shown_and_yanked(desk: Desk, language: list[str]) -> None:
+    assert main(["new", "my_first", *language]) == 0
     assert "can be published: my_first 1.0.0" in desk.does("publish", "my_first", "--check")
     assert "on offer: my_first 1.0.0" in desk.does("publish", "my_first")
     assert re.search(r"(?m)^my_first +1\.0\.0 +dynamic +rapp ", desk.does("store", "list"))
@@ -109,6 +110,28 @@ def test_what_is_used_must_be_asked_for(desk: Desk, tmp_path: Path, program: str
     assert missing_permissions(folder, parse_manifest((folder / "package.json").read_bytes())) == missing
     if missing:
         assert missing[0] in desk.refuses("publish", folder)
+
+
+@pytest.mark.parametrize(
+    ("program", "missing"),
+    [
+        ("communication.textToSpeech('x'); vision.captureImage();", ["rapp_capture_image"]),
+        ("await navigation\n  .moveTo(1, 0, 0);", ["rapp_move_to"]),
+        ("new ROSLIB.Service({ ros, name: '/rapp_rest', serviceType: 'rapp_msgs/Rest' });", ["rapp_rest"]),
+        (
+            "cloud.call('weather'); cloud.call(\"profile\"); cloud.callAgent('mine'); cloud.sendMail([]);",
+            ["cloud send_mail", "cloud weather"],
+        ),
+        ("// communication.playAudio('x')\n/* navigation.rest(\n) */", []),
+        ("robot.moveTo(1, 0, 0);", []),
+    ],
+)
+def test_what_javascript_uses_must_be_asked_for(tmp_path: Path, program: str, missing: list[str]) -> None:
+    folder = source_folder(tmp_path)
+    (folder / "more.mjs").write_text(program)
+    (folder / "node_modules" / "other").mkdir(parents=True)
+    (folder / "node_modules" / "other" / "index.js").write_text("navigation.moveVel(1, 0, 0)")
+    assert missing_permissions(folder, parse_manifest((folder / "package.json").read_bytes())) == missing
 
 
 def test_the_rapps_of_the_repository_could_all_be_published(desk: Desk) -> None:

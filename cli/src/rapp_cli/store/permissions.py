@@ -4,10 +4,11 @@ A hint for authors, not a wall: the core agent refuses what was not granted, how
 """
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.manifest import CORE_SERVICES, Manifest
 
 _FUNCTIONS = {
     "text_to_speech": "rapp_say",
@@ -28,6 +29,12 @@ _FUNCTIONS = {
 _MODULES = ("communication", "navigation", "vision")
 _CALLS = ("call", "call_wait")  # of rapp_api.cloud
 _MAILS = ("send_mail", "send_mail_wait")
+_JAVASCRIPT = (".js", ".mjs", ".cjs")
+_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+_VERB = re.compile(r"\b(?:communication|navigation|vision|keepsakes)\s*\.\s*(\w+)\s*\(")
+_SERVICE = re.compile(r"""["'`]/?(rapp_\w+)["'`]""")  # as other clients of rosbridge write it
+_CLOUD_CALL = re.compile(r"""\bcloud\s*\.\s*call\s*\(\s*["'`](\w+)["'`]""")
+_MAIL = re.compile(r"\bcloud\s*\.\s*sendMail\s*\(")
 
 
 def missing_permissions(folder: Path, manifest: Manifest) -> list[str]:
@@ -36,7 +43,24 @@ def missing_permissions(folder: Path, manifest: Manifest) -> list[str]:
         return []
     granted = {*manifest.permissions.core, *(f"cloud {name}" for name in manifest.permissions.cloud)}
     used = {name for path in sorted(folder.rglob("*.py")) for name in _used(path)}
+    own = [path for path in folder.rglob("*") if path.suffix in _JAVASCRIPT and "node_modules" not in path.parts]
+    used |= {name for path in sorted(own) for name in _used_in_javascript(path)}
     return sorted(used - granted)
+
+
+def _used_in_javascript(path: Path) -> Iterator[str]:
+    text = _COMMENT.sub("", path.read_text(errors="replace"))
+    verbs = {_camel_case(name): service for name, service in _FUNCTIONS.items()}
+    yield from (verbs[name] for name in _VERB.findall(text) if name in verbs)
+    yield from (name for name in _SERVICE.findall(text) if name in CORE_SERVICES)
+    yield from (f"cloud {name}" for name in _CLOUD_CALL.findall(text))
+    if _MAIL.search(text):
+        yield "cloud send_mail"
+
+
+def _camel_case(name: str) -> str:
+    first, *others = name.split("_")
+    return first + "".join(map(str.capitalize, others))
 
 
 def _used(path: Path) -> Iterator[str]:
