@@ -21,7 +21,7 @@ class Publisher:
         self.key = CryptoSigner.generate_ed25519()
         self._shelf = shelf
         self._packages = folder / f"{name}-packages"
-        self._packages.mkdir()
+        self._packages.mkdir(exist_ok=True)
         store = shelf.metadata.parent
         self._store = TrustedStore(StoreFolder(store), "store:", shelf.root_file.read_bytes(), folder / f"{name}-seen")
 

@@ -179,6 +179,8 @@ def test_what_is_wrong_at_home_is_said_there(
     other.write_bytes((cloud.data / "root.json").read_bytes().replace(b'"sig":"', b'"sig":"00', 1))
     monkeypatch.setenv("RAPP_ROOT_FILE", str(other))
     assert otto.far(capsys, "publish", rapp(tmp_path / "g", "oven")) == 2 and "cannot trust the store" in otto.err
+    assert otto.owner(capsys, "store", "renew") == 2 and "--cloud" in otto.err
+    assert otto.owner(capsys, "keys", "new", "paula", "--public", str(otto.file)) == 2 and "is otto's" in otto.err
     assert files(cloud) == before
     assert otto.token.read_text() not in cloud.log.read_text()
 
@@ -286,6 +288,33 @@ def test_what_a_forger_hands_in_changes_nothing(
         hand_in(eve, other, eve.signed(right))
     hand_in(vera, build(Path(rapp(tmp_path, "violin", "1.1.0"))), vera.list_with(build(tmp_path / "pass" / "violin-1.1.0")))
     assert installed(cloud, tmp_path / "robot", "violin") == "1.1.0"
+
+
+def test_of_two_at_once_one_is_told_to_run_it_again(
+    cloud: CloudProcess, someone: Callable[[str], Provider], tmp_path: Path
+) -> None:
+    both = Publisher("both", open_shelf(cloud.data), tmp_path)
+    both.join("bell", "buzzer")
+    token = someone("both").give_token()
+    calls = []
+    for name in ("bell", "buzzer"):
+        package, signed_list = tmp_path / name, tmp_path / f"{name}.list"
+        package.write_bytes(build(Path(rapp(tmp_path, name, program=f"'{name}'\n"))))
+        signed_list.write_bytes(both.list_with(package.read_bytes()))
+        calls.append({"package": package, "signed_list": signed_list})
+
+    async def at_once() -> list[Any]:
+        client = HopClient(f"https://127.0.0.1:{cloud.port}", token, ca_file=certificate_of(cloud))
+        try:
+            return await asyncio.gather(*(client.call("publish_package", one) for one in calls), return_exceptions=True)
+        finally:
+            await client.close()
+
+    found = asyncio.run(at_once())
+    (refused,) = [one for one in found if isinstance(one, HopError)]
+    assert isinstance(refused, Refused) and "somebody published meanwhile; run it again" in str(refused)
+    (done,) = [one for one in found if one is not refused]
+    assert [name for name in ("bell", "buzzer") if name in listed(cloud)] == [done["name"]]
 
 
 def manifest_of(package: bytes) -> Manifest:

@@ -6,27 +6,19 @@ operation was done again. Each try is a process of its own; this one starts no t
 """
 
 import asyncio
-import builtins
-import errno
-import io
 import json
-import os
 import shutil
-import signal
 import sys
-import traceback
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
+from fakes.cutting import Cut, cutter, in_child, put_in
 from rapp_hop.errors import HopError, Refused
 from rapp_hop.hz.delivery import Delivery
 from rapp_hop.streaming import Progress, Writer
 
 PIECE = 32 * 1024  # bytes that come at once
-TAKES_SPACE = ("mkdir", "open", "fsync", "rename", "replace", "symlink", "write", "utime", "chmod")
-GIVES_SPACE = ("unlink", "rmdir")
-Cut = Callable[[str], None]  # called before each step with its name
 
 
 class Client:
@@ -50,62 +42,6 @@ class Client:
         return len(data)
 
 
-class Cutting:
-    """A file that is written step by step."""
-
-    def __init__(self, file: Any, cut: Cut) -> None:
-        self._file, self._cut = file, cut
-
-    def write(self, data: bytes) -> int:
-        self._cut("write")
-        return int(self._file.write(data))
-
-    def __enter__(self) -> "Cutting":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._file.close()
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._file, name)
-
-
-def put_in(cut: Cut) -> None:
-    """Have `cut` called before every step, in this process."""
-
-    def before(name: str, work: Callable[..., Any], wanted: Callable[..., bool]) -> Callable[..., Any]:
-        def cut_or_do(*words: Any, **more: Any) -> Any:
-            if wanted(*words, **more):
-                cut(name)
-            return work(*words, **more)
-
-        return cut_or_do
-
-    for name in (*TAKES_SPACE[:1], *TAKES_SPACE[2:], *GIVES_SPACE):
-        if name != "write":
-            setattr(os, name, before(name, getattr(os, name), lambda *_, **__: True))
-    os.open = before("open", os.open, lambda _path, flags, *_, **__: bool(flags & os.O_CREAT))
-    writing = before("open", io.open, lambda _file, mode="r", *_, **__: isinstance(mode, str) and not mode.startswith("r"))
-    io.open = builtins.open = writing
-    plain = os.fdopen
-    os.fdopen = lambda *words, **more: Cutting(plain(*words, **more), cut)  # type: ignore[assignment]
-
-
-def cutter(how: str, step: int, seen: list[str]) -> Cut:
-    """Cut at the step of this number."""
-
-    def cut(name: str) -> None:
-        seen.append(name)
-        if len(seen) <= step:
-            return
-        if how == "killed":
-            os.kill(os.getpid(), signal.SIGKILL)
-        elif name in TAKES_SPACE:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    return cut
-
-
 OPERATIONS: dict[str, Callable[[Delivery], Awaitable[object]]] = {
     "install": lambda delivery: delivery.install("hello"),
     "started": lambda delivery: delivery.started("hello", "1.1.0", ok=True),
@@ -125,25 +61,6 @@ def look(home: Path) -> dict[str, Any]:
         "rapps": sorted(path.name for path in (home / "rapps").glob("*")),
         "downloads": sorted(path.suffix for path in downloads.glob("*")),
     }
-
-
-def in_child(work: Callable[[], dict[str, Any]]) -> dict[str, Any] | None:
-    """What `work` gives in a process of its own; None when that was killed."""
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(reading)
-        try:
-            told = work()
-        except BaseException:  # noqa: BLE001 (told to the test)
-            told = {"fault": traceback.format_exc()}
-        os.write(writing, json.dumps(told).encode())
-        os._exit(0)
-    os.close(writing)
-    with os.fdopen(reading, "rb") as pipe:
-        text = pipe.read()
-    os.waitpid(child, 0)
-    return dict(json.loads(text)) if text else None
 
 
 def attempt(store: Path, home: Path, operation: str, cut: Cut) -> str:

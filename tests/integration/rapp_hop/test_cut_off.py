@@ -20,6 +20,7 @@ from rapp_hop.hz.archive import build
 from rapp_hop.hz.delivery import Delivery
 
 SCRIPT = Path(__file__).with_name("cut_off.py")
+TESTS = SCRIPT.parents[2]
 FILES = {version: f"print({version!r})\n" for version in ("1.0.0", "1.1.0")}  # the programs
 
 
@@ -90,7 +91,8 @@ def test_every_step(
 
 def run(store: Path, home: Path, work: Path, operation: str, how: str) -> list[dict[str, Any]]:
     words = [sys.executable, str(SCRIPT), str(store), str(home), str(work), operation, how]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=110, check=False)
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(TESTS), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run(words, env=env, capture_output=True, text=True, timeout=110, check=False)
     assert done.returncode == 0, done.stderr
     tries = [json.loads(line) for line in done.stdout.splitlines()]
     print(f"{operation}, {home.name}, {how}: {len(tries)} steps")
