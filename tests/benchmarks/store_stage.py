@@ -46,6 +46,7 @@ class Platform:
         self.log = folder / "cloud.log"
         self.port = 0
         self.pid = 0
+        self.ready = 0.0  # by `clock`
         self.command("init", "--robot", "nao", "--host", "127.0.0.1")
         self.token = (self.data / "robots" / "nao.token").read_text()
         self.certificate = self.data / "tls" / "certificate.pem"
@@ -84,6 +85,7 @@ class Platform:
             if not text.startswith("READY "):
                 raise SystemExit(f"cannot start the platform: {self.log.read_text()[-2000:]}")
             self.port, self.pid = json.loads(text[6:])["port"], process.pid
+            self.ready = clock()
             self._settle()
             yield self
         finally:
