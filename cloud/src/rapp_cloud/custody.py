@@ -100,6 +100,8 @@ class Custody:
             if application is not None and name in delegated(lists):
                 self._ledger.write(lists, ["targets"], follow(lists, application))
                 self._ledger.keys.remove(name)
+            elif application is not None:
+                raise Refused(f"cannot put another key in the place of {name}'s: that is no publisher, see ./rapp keys list")
             elif name in ROLES:
                 self._rotate_role(lists, name)
             elif name in delegated(lists):
@@ -160,8 +162,7 @@ def add_publisher(ledger: Ledger, lists: Lists, publisher: str) -> Targets:
     own.version = known.version if known else 0
     if known:  # its packages stay known, so that no version comes back with other bytes
         old = ledger.list_of(publisher, known.version)
-        hashes = {path: target.hashes["sha256"] for path, target in old.targets.items()}
-        own.unrecognized_fields[YANKED] = {**old.unrecognized_fields.get(YANKED, {}), **hashes}
+        own.unrecognized_fields[YANKED] = Standing(publisher, lists.targets, old).known
     lists.publishers[publisher] = own
     return own
 
@@ -180,13 +181,14 @@ def admit(ledger: Ledger, lists: Lists, application: Application) -> dict[str, b
         again = f"./rapp keys own {publisher} --after {last}"
         raise Refused(f"cannot take list {application.own.version} of {publisher}: {last + 1} comes next, have them run {again}")
     _delegate(lists, publisher, key)
+    before = Standing(publisher, lists.targets, ledger.list_of(publisher, last)).known if known else {}
+    lists.targets.unrecognized_fields.get(KNOWN, {}).pop(publisher, None)  # an empty list cannot have it
     empty = Targets()
     empty.version = last
     change = judge(Standing(publisher, lists.targets, empty), application.data, datetime.now(UTC))
     if change.added is not None:
         raise Refused(f"cannot take the list of {publisher}: it must be empty, have them run ./rapp keys own {publisher}")
-    if known:
-        before = Standing(publisher, lists.targets, ledger.list_of(publisher, last)).known
+    if before:
         lists.targets.unrecognized_fields.setdefault(KNOWN, {})[publisher] = before
     lists.publishers[publisher] = change.own
     return {publisher: application.data}

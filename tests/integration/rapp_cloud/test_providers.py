@@ -73,6 +73,12 @@ def listed(cloud: CloudProcess) -> dict[str, str]:
     return {entry["name"]: entry["version"] for entry in found["rapps"]}
 
 
+def page(cloud: CloudProcess) -> str:
+    pieces: list[bytes] = []
+    as_robot(cloud, lambda client: client.download("/store", pieces.append, 2**20))
+    return b"".join(pieces).decode()
+
+
 def files(cloud: CloudProcess) -> set[str]:
     return {path.name for path in (cloud.data / "tuf").rglob("*") if path.suffix in (".json", ".hz")} - {"timestamp.json"}
 
@@ -101,6 +107,7 @@ def test_from_an_authors_desk_to_a_robot(
     assert "clock" not in listed(cloud)
     assert maria.far(capsys, "publish", source) == 0 and "on offer: clock 1.0.0" in maria.out
     assert listed(cloud)["clock"] == "1.0.0"
+    assert '<article id="clock">' in page(cloud) and "<dt>Signed by</dt><dd>maria</dd>" in page(cloud)
     assert installed(cloud, tmp_path / "robot", "clock") == "1.0.0"
     assert maria.far(capsys, "publish", source) == 0  # the same again changes nothing
     assert not (cloud.data / "keys" / "maria.pem").exists()

@@ -242,6 +242,14 @@ def test_keys_that_are_known_no_more(shelf: Shelf, maria: Publisher, robot: Trus
     hand_in(shelf, maria, newer)
     assert robot.versions("clock").yanked == {"1.0.0"}
     assert offered(robot) == ["1.1.0"]
+    shelf.custody.revoke("maria")
+    maria.key = CryptoSigner.generate_ed25519()
+    shelf.custody.add("maria", maria.application(first_list(4)))
+    shelf.custody.revoke("maria")
+    shelf.custody.add("maria")  # a key of the platform's, after one that has signed nothing
+    with pytest.raises(Refused, match="other bytes"):
+        shelf.publish(package(tmp_path, program="evil()\n"))
+    assert robot.versions("clock").yanked == {"1.0.0", "1.1.0"}
 
 
 def test_another_key_takes_over_what_is_on_offer(shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path: Path) -> None:
@@ -276,6 +284,9 @@ def test_applications_that_are_not_taken(shelf: Shelf, maria: Publisher, tmp_pat
         shelf.custody.add("eve", eve.application(full))
     with pytest.raises(Refused, match="is taken"):
         shelf.custody.add("maria", maria.application())
+    for name in ("eve", "targets"):
+        with pytest.raises(Refused, match="that is no publisher"):
+            shelf.custody.rotate(name, eve.application())
     assert [holder.name for holder in shelf.custody.publishers()] == ["maria", "rapp"]
 
 

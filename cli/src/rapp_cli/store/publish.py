@@ -26,7 +26,9 @@ from rapp_hop.hz.standing import signed
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `./rapp publish`."""
     parser.add_argument("folder", type=Path, help="with package.json; of a four-agent RApp, with dynamic/ and cloud/")
-    parser.add_argument("--publisher", metavar="NAME", help="who signs, see ./rapp keys (default: whose name it is, or rapp)")
+    parser.add_argument(
+        "--publisher", metavar="NAME", help="who signs (whose name it is, or rapp; with --cloud, whose key is here)"
+    )
     parser.add_argument("--only", action="append", default=[], metavar="ROBOT", help="offer it to this robot only; may be repeated")
     parser.add_argument("--check", action="store_true", help="only check, publish nothing")
     add_store_options(parser)

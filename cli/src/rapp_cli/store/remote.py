@@ -61,7 +61,7 @@ class RemoteStore:
         """
         found = await asyncio.to_thread(self._store.standings, publisher)
         if not found:
-            text = f"cannot publish as {publisher}: the store knows no key and no name of theirs"
+            text = f"cannot publish as {publisher}: the store knows no key or no name of theirs"
             new = f"./rapp keys new {publisher} --public FILE (made by ./rapp keys own) and ./rapp keys grant {publisher} RAPP"
             raise Refused(f"{text}; ask who keeps the platform for {new}")
         return found[0]
