@@ -38,3 +38,14 @@ def test_a_new_rapp_runs_at_once_and_a_broken_one_tells_where(tmp_path: Path) ->
     assert ran.returncode == 1
     assert "FAILED" in ran.stdout and "nobody" in ran.stdout
     assert processes_of(tmp_path) == []
+
+
+def test_so_does_one_in_javascript(tmp_path: Path) -> None:
+    """Asked for by its keyword, it comes from the store, and is done; nothing of it is left."""
+    assert rapp(tmp_path, "new", "my_script", "--javascript").returncode == 0
+    ran = rapp(tmp_path, "run", "my_script")
+    assert ran.returncode == 0, ran.stdout[-3000:] + ran.stderr
+    story = ["hears “my script”", "link->repository GET my_script-1.0.0.hz", "says  “hello Maria, this is my script”", "destroyed"]
+    assert [ran.stdout.find(each) for each in story] == sorted(ran.stdout.find(each) for each in story)
+    assert all(each in ran.stdout for each in story)
+    assert processes_of(tmp_path) == []

@@ -29,6 +29,13 @@ class Rogue:
     body: str
     said: str
     bound: float
+    runtime: str = "python3"
+
+    @property
+    def program(self) -> str:
+        """What it executes, with the word before."""
+        say = "communication.rapp_say('here')" if self.runtime == "python3" else "await communication.textToSpeech('here');"
+        return f"{say}\n{self.body}"
 
 
 CHANNEL = "import os, socket\nend = socket.socket(fileno=int(os.environ['RAPP_CHANNEL_FD']))\n"
@@ -67,6 +74,14 @@ ROGUES = {
         "import signal, time, types\nfor number in (signal.SIGTERM, signal.SIGINT): signal.signal(number, signal.SIG_IGN)\n"
         "self.dismantle = lambda: time.sleep(1000)", "", 2.0 + 1.0 + 1.0,
     ),
+    "exits from node": Rogue("process.exit(3);", "It has crashed", 2.0, "javascript"),
+    "blocks its event loop": Rogue("while (true) {}", "It hangs", 2.0 + 2.0, "javascript"),
+    "writes for ever": Rogue(
+        "while (true) { console.log('x'.repeat(100_000)); await null; }", "It has crashed", 4.0, "javascript"
+    ),
+    "node ignores its end": Rogue(
+        "process.on('SIGTERM', () => {}); this.dismantle = () => new Promise(() => {});", "", 2.0 + 1.0 + 1.0, "javascript"
+    ),
 }  # fmt: skip
 PERMISSIONS = {"core": ["rapp_say", "rapp_play_audio"], "cloud": []}
 
@@ -75,8 +90,8 @@ PERMISSIONS = {"core": ["rapp_say", "rapp_play_audio"], "cloud": []}
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WholeRobot]:
     folder = tmp_path_factory.mktemp("rogues")
     packages = [
-        write_rapp(folder / "rapps" / name, name.replace(" ", "_"), f"communication.rapp_say('here')\n{rogue.body}", (name,),
-                   permissions=PERMISSIONS)
+        write_rapp(folder / "rapps" / name, name.replace(" ", "_"), rogue.program, (name,),
+                   permissions=PERMISSIONS, runtime=rogue.runtime)
         for name, rogue in ROGUES.items()
     ]  # fmt: skip
     robot = WholeRobot(folder / "robot", packages)

@@ -61,11 +61,11 @@ function terminate(error) {
     return;
   }
   ended = true;
+  const detail = error ? words(error).slice(0, LONGEST_DETAIL) : "";
+  channel.send({ type: "terminate", outcome: error ? "failed" : "done", detail });
   if (error) {
     console.error("the RApp has failed", error);
   }
-  const detail = error ? words(error).slice(0, LONGEST_DETAIL) : "";
-  channel.send({ type: "terminate", outcome: error ? "failed" : "done", detail });
   setTimeout(leave, DISMANTLE);
 }
 
