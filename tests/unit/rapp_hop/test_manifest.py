@@ -25,6 +25,10 @@ def test_a_right_one() -> None:
     assert found.parameters == {"seconds": 8}
 
 
+def test_a_dynamic_agent_may_be_javascript() -> None:
+    assert read(manifest(runtime="javascript")).runtime == "javascript"
+
+
 def test_left_out_parts_grant_nothing() -> None:
     whole = manifest()
     whole["rapp"] = {"agent": "cloud", "entry": "a.py", "runtime": "python3"}
@@ -112,6 +116,7 @@ def test_all_core_services_can_be_granted() -> None:
     [
         ({"agent": "static"}, "rapp.agent"),
         ({"runtime": "cobol"}, "rapp.runtime"),
+        ({"agent": "cloud", "runtime": "javascript", "keywords": {}, "sentences": {}, "permissions": {}}, "cloud agent: write python3"),
         ({"entry": 3}, "rapp.entry must be a text"),
         ({"keywords": {"en": "hello"}}, "list of texts"),
         ({"keywords": {"en": [3]}}, "list of texts"),
