@@ -116,7 +116,10 @@ def test_all_core_services_can_be_granted() -> None:
     [
         ({"agent": "static"}, "rapp.agent"),
         ({"runtime": "cobol"}, "rapp.runtime"),
-        ({"agent": "cloud", "runtime": "javascript", "keywords": {}, "sentences": {}, "permissions": {}}, "cloud agent: write python3"),
+        (
+            {"agent": "cloud", "runtime": "javascript", "keywords": {}, "sentences": {}, "permissions": {}},
+            "cloud agent: write python3",
+        ),
         ({"entry": 3}, "rapp.entry must be a text"),
         ({"keywords": {"en": "hello"}}, "list of texts"),
         ({"keywords": {"en": [3]}}, "list of texts"),
