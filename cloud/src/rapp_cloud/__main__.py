@@ -18,7 +18,7 @@ from rapp_cloud.config import PREFIX, CloudConfig, load_config
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import PASSPHRASE, passphrase_from
 from rapp_cloud.memory import open_memory
-from rapp_cloud.tls import CERTIFICATE, make_certificate
+from rapp_cloud.tls import CERTIFICATE, make_certificate, may_be_made_anew
 from rapp_cloud.witness import noting_offers
 from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
@@ -94,7 +94,9 @@ def _init(words: list[str]) -> int:
     given = [token_file, data / "root.json"]
     if options.host:
         certificate = data / "tls" / CERTIFICATE
-        given.append(certificate if certificate.exists() else make_certificate(data / "tls", options.host))
+        if not certificate.exists() or may_be_made_anew(certificate):
+            make_certificate(data / "tls", options.host)
+        given.append(certificate)
     print(f"give to the robot: {', '.join(map(str, given))}")
     return 0
 

@@ -9,13 +9,14 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+from rapp_cloud.certificate import Certificate
 from rapp_cloud.cloud_agents.agents import CloudAgents, Quota
 from rapp_cloud.cloud_agents.doors import Doors
 from rapp_cloud.cloud_agents.engine import LocalProcesses
 from rapp_cloud.cloud_agents.packages import Packages
 from rapp_cloud.config import CloudConfig
 from rapp_cloud.entrance import entrance
-from rapp_cloud.health import checks_of, expiry, health
+from rapp_cloud.health import checks_of, health
 from rapp_cloud.interpreter.port import Commands, Interpretation, Interpreter
 from rapp_cloud.keys import Passphrase
 from rapp_cloud.memory import Memory, remembering
@@ -32,7 +33,6 @@ from rapp_cloud.services.voice import voice_services
 from rapp_cloud.shelf import Shelf
 from rapp_cloud.static import store_files
 from rapp_cloud.store_page import store_page
-from rapp_cloud.tls import server_tls
 from rapp_cloud.turnstile import Turnstile
 from rapp_cloud.weblets import weblets
 from rapp_cloud.witness import note_offers, noted
@@ -76,31 +76,32 @@ async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Me
     workers = Workers(load_interpreter, config.workers)
     doors = Doors(config.data / "agents", config.data / "uploads", memory.accounts.name_of)
     agents = _cloud_agents(config, shelf, robots, doors)
-    tls_files = config.tls_files
-    tls = server_tls(*tls_files) if tls_files else None
-    metrics = _metrics(robots, agents, tls_files)
-    checks = checks_of(memory, config.data, shelf.metadata / "timestamp.json", tls_files[0] if tls_files else None)
+    certificate = Certificate(*config.tls_files) if config.tls_files else None
+    metrics = _metrics(robots, agents, certificate)
+    checks = checks_of(memory, config.data, shelf.metadata / "timestamp.json", certificate)
     registry = _registry(config, shelf, workers, robots, agents, memory)
     admit = Turnstile(memory.accounts, memory.quotas, time.monotonic).admit
     server = MeasuredServer(metrics, admit, registry, doors.caller, config.data / "uploads", [
         *entrance(memory.admission, memory.audit),
-        *health(checks, metrics, memory.accounts.name_of),
+        *health(checks, metrics, memory.accounts.name_of, certificate),
         store_files("/tuf/metadata/", shelf.metadata),
         noted(store_files("/tuf/targets/", shelf.targets), memory),
         runs_page(),
-        weblets(shelf, "https" if tls else "http"),
+        weblets(shelf, "https" if certificate else "http"),
         store_page(shelf),
         agent_calls(agents),
-    ], tls=tls)  # fmt: skip
-    refreshing = asyncio.create_task(_keep_fresh(shelf, config.refresh))
+    ], tls=certificate.context if certificate else None)  # fmt: skip
+    keeping = [asyncio.create_task(_keep_fresh(shelf, config.refresh))]
+    keeping += [asyncio.create_task(certificate.keep())] if certificate else []
     try:
         await workers.start()
         await agents.open()
         server.listen_unix(doors.platform)
         yield server.listen(config.port, config.address)
     finally:
-        refreshing.cancel()
-        await asyncio.gather(refreshing, return_exceptions=True)
+        for task in keeping:
+            task.cancel()
+        await asyncio.gather(*keeping, return_exceptions=True)
         await agents.close()
         await server.close()
         await workers.close()
@@ -122,13 +123,12 @@ def _cloud_agents(config: CloudConfig, shelf: Shelf, robots: Robots, doors: Door
     return CloudAgents(engine, Packages(shelf, folder / "packages"), robots.is_here, Quota(config.agents_of_one, config.agents))
 
 
-def _metrics(robots: Robots, agents: CloudAgents, tls_files: tuple[Path, Path] | None) -> Metrics:
+def _metrics(robots: Robots, agents: CloudAgents, certificate: Certificate | None) -> Metrics:
     metrics = Metrics()
     metrics.show("rapp_robots", "Robots whose lease holds", robots.count)
     metrics.show("rapp_cloud_agents", "Cloud agents that run", agents.count)
-    if tls_files:
-        until = expiry(tls_files[0])
-        metrics.show("rapp_certificate_expiry_seconds", "Until when the TLS certificate is good", lambda: until)
+    if certificate:
+        metrics.show("rapp_certificate_expires_seconds", "In how long the TLS certificate expires", certificate.left)
     return metrics
 
 

@@ -12,8 +12,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from cryptography import x509
-
+from rapp_cloud.certificate import Certificate
 from rapp_cloud.memory import Memory
 from rapp_cloud.metrics import Metrics
 from rapp_cloud.tls import is_loopback
@@ -35,7 +34,9 @@ Check = Callable[[], None]
 """Raises a HopError or OSError when something is not as it must be; blocking."""
 
 
-def health(checks: Sequence[Check], metrics: Metrics, authenticate: Authenticate) -> list[Mount]:
+def health(
+    checks: Sequence[Check], metrics: Metrics, authenticate: Authenticate, certificate: Certificate | None = None
+) -> list[Mount]:
     """Make the three."""
 
     async def healthz() -> WireAnswer:
@@ -47,7 +48,8 @@ def health(checks: Sequence[Check], metrics: Metrics, authenticate: Authenticate
                 reasons = await asyncio.to_thread(_reasons, checks)
         except TimeoutError:
             reasons = [f"cannot tell within {PATIENCE:g} s: try again later"]
-        return _json(503 if reasons else 200, {"ready": not reasons, "reasons": reasons})
+        until = {"certificate_expires": certificate.end} if certificate else {}
+        return _json(503 if reasons else 200, {"ready": not reasons, "reasons": reasons, **until})
 
     async def read_metrics() -> WireAnswer:
         return WireAnswer(200, _PROMETHEUS, await asyncio.to_thread(metrics.text))
@@ -63,7 +65,7 @@ def health(checks: Sequence[Check], metrics: Metrics, authenticate: Authenticate
     ]
 
 
-def checks_of(memory: Memory, data: Path, timestamp: Path, certificate: Path | None) -> list[Check]:
+def checks_of(memory: Memory, data: Path, timestamp: Path, certificate: Certificate | None) -> list[Check]:
     """Return what must be so that the platform can serve."""
 
     def store() -> None:
@@ -76,15 +78,10 @@ def checks_of(memory: Memory, data: Path, timestamp: Path, certificate: Path | N
             raise Unreachable(f"cannot keep anything more: the disk has less than {LEAST_DISK // 2**20} MiB left, free some space")
 
     def tls() -> None:
-        if certificate is not None and expiry(certificate) < time.time():
-            raise Unreachable(f"cannot be trusted: {certificate.name} has expired, run rapp_cloud init --host NAME")
+        if certificate is not None and certificate.left() < 0:
+            raise Unreachable(f"cannot be trusted: {certificate.name} has expired at {certificate.end}, put a new one in its place")
 
     return [memory.database.check, store, disk, tls]
-
-
-def expiry(certificate: Path) -> float:
-    """Return until when a certificate is good, in seconds since 1970 (UTC)."""
-    return x509.load_pem_x509_certificate(certificate.read_bytes()).not_valid_after_utc.timestamp()
 
 
 class _Kept:

@@ -19,6 +19,7 @@ from rapp_cloud.files import write_whole
 from rapp_hop.errors import Invalid, Refused
 
 CERTIFICATE, KEY = "certificate.pem", "key.pem"
+WARNING = 14 * 86400.0  # seconds before its end at which a certificate should be renewed
 _LASTS = timedelta(days=3650)
 
 
@@ -57,6 +58,22 @@ def make_certificate(folder: Path, hosts: Sequence[str]) -> Path:
     return folder / CERTIFICATE
 
 
+def expiry(certificate: Path) -> float:
+    """Return until when a certificate is good, in seconds since 1970 (UTC).
+
+    :raises Refused: when it cannot be read
+    :raises Invalid: when it is none
+    """
+    return _read(certificate).not_valid_after_utc.timestamp()
+
+
+def may_be_made_anew(certificate: Path) -> bool:
+    """Tell whether a certificate is one of our own making, and at its end."""
+    found = _read(certificate)
+    ends = found.not_valid_after_utc.timestamp() - datetime.now(UTC).timestamp() < WARNING
+    return ends and found.issuer == found.subject
+
+
 def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
     """Return what to speak TLS with.
 
@@ -74,6 +91,15 @@ def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
     except OSError as error:
         raise Refused(f"cannot use {certificate} with {key}: {error.strerror}, run rapp_cloud init --host NAME") from None
     return context
+
+
+def _read(certificate: Path) -> x509.Certificate:
+    try:
+        return x509.load_pem_x509_certificate(certificate.read_bytes())
+    except OSError as error:
+        raise Refused(f"cannot read {certificate}: {error.strerror}") from None
+    except ValueError:
+        raise Invalid(f"cannot read {certificate}: it is no certificate in PEM form") from None
 
 
 def _name(host: str) -> x509.GeneralName:

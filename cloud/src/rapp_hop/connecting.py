@@ -3,6 +3,7 @@
 import errno
 import math
 import socket
+import ssl
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -24,6 +25,13 @@ BY_STATUS: dict[int, type[HopError]] = {
     400: Invalid, 401: Refused, 403: Refused, 404: Refused, 408: Unreachable, 413: Refused, 429: Unreachable,
     500: Bug, 502: Unreachable, 503: Unreachable, 504: Unreachable,
 }  # fmt: skip
+_DISTRUST = {
+    9: "its certificate is not good yet; set this computer's clock, or wait",
+    10: "its certificate has expired; who runs it must renew it (or this computer's clock is wrong)",
+    **dict.fromkeys((18, 19, 20, 21), "nobody whom this computer trusts vouches for its certificate; name the file of who does"),
+    **dict.fromkeys((62, 64), "its certificate is for another name; call it by that, or have the certificate made for this one"),
+}
+"""By OpenSSL's X509_V_ERR_…"""
 _NOBODY = frozenset({errno.ECONNREFUSED, errno.ENOENT, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN})
 
 
@@ -56,6 +64,8 @@ async def fetch(client: SimpleAsyncHTTPClient, request: HTTPRequest, timeout: fl
         raise _away(f"cannot reach {where} within {timeout:g} s: try again later", CUT if sent else NOT_SENT) from None
     except HTTPStreamClosedError:
         raise _away(f"cannot read the answer of {where}: the connection was cut, try again", CUT) from None
+    except ssl.SSLCertVerificationError as error:
+        raise _away(f"cannot trust {where}: {_DISTRUST.get(error.verify_code, error.verify_message)}", NOT_SENT) from None
     except (OSError, HTTPClientError) as error:
         sent = not isinstance(error, socket.gaierror) and getattr(error, "errno", None) not in _NOBODY
         raise _away(f"cannot reach {where}: {error}, try again later", CUT if sent else NOT_SENT) from None

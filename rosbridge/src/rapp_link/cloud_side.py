@@ -43,6 +43,7 @@ class Platform:
         self._registered = False
         self._lease = 3 * config.heartbeat_most  # seconds; the platform says it
         self._wake = asyncio.Event()
+        self._complaint = ""  # what the log says of the platform already
         self.reachable = False
 
     @property
@@ -115,10 +116,11 @@ class Platform:
                 await self._register(identity, PATIENCE)
             await self._send_reports(identity)
         except HopError as error:
-            if self.reachable or isinstance(error, Refused):
+            if self.reachable or isinstance(error, Refused) or str(error) != self._complaint:
                 _log.warning("%s", error)
-            self.reachable = False
+            self.reachable, self._complaint = False, str(error)
             return False
+        self._complaint = ""
         return True
 
     async def _heartbeat(self) -> bool:
