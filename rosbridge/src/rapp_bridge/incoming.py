@@ -28,7 +28,7 @@ from rapp_bridge.protocol import (
     Unsubscribe,
 )
 
-_NAME = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*")  # wiki.ros.org/Names
+_NAME = re.compile(r"[~/A-Za-z][A-Za-z0-9_/]*")  # wiki.ros.org/Names; "/" and "~" alone are namespaces
 _COUNT_LIMIT = 1_000_000
 _INTEGERS = range(-(1 << 63), 1 << 64)  # what JSON's readers can take back
 
@@ -95,7 +95,7 @@ def _name(fields: dict[str, Any], field: str) -> str:
 
 @lru_cache(4096)
 def _is_name(value: str) -> bool:
-    return len(value) <= 1000 and _NAME.fullmatch(value) is not None
+    return len(value) <= 1000 and _NAME.fullmatch(value) is not None and value.strip("~/") != ""
 
 
 def _id(fields: dict[str, Any]) -> Id:

@@ -53,7 +53,7 @@ def test_w05_subscribe_to_everything(url: str, roscore: str) -> None:
     async def story() -> None:
         async with witness(url):
             wire = await Wire.open(url)
-            for topic in ("*", "/*", "/latched*", ""):
+            for topic in ("*", "/*", "/latched*", "", "/"):
                 wire.send(op="subscribe", topic=topic, type=STRING)
                 await told(wire)
             assert not known(roscore, "*")

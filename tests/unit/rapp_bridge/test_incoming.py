@@ -48,6 +48,14 @@ def test_a_binary_frame_with_json_is_read() -> None:
     assert parse(b'{"op": "x"}') == {"op": "x"}
 
 
+@pytest.mark.parametrize("name", ["/", "~", "~/", "//", "*", "/a b", "/a-b", "1a", "/" + "a" * 1000])
+def test_what_names_no_topic_and_no_service_is_refused_by_its_name(name: str) -> None:
+    with pytest.raises(Invalid, match=r"^cannot serve the message: topic '.*' is no ROS name$"):
+        decode({"op": "subscribe", "topic": name})
+    with pytest.raises(Invalid, match=r"^cannot serve the message: service '.*' is no ROS name$"):
+        decode({"op": "call_service", "service": name})
+
+
 def test_what_roslibjs_sends_is_read() -> None:
     assert decode(
         {"op": "subscribe", "id": "subscribe:/x:1", "type": "std_msgs/String", "topic": "/x", "compression": "cbor",
