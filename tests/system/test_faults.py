@@ -1,20 +1,18 @@
 """Processes of the robot are killed or frozen, and brought back, in every state of the core FSM: it listens again each time.
 
-One table, states x faults, printed at the end. Each column has a robot of its own, so that columns run side by side.
+One table, states x faults, printed at the end.
 """
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from fakes.fault_table import Cell, Cells, FaultTable, listened_before, serve
 from fakes.rapps import write_rapp
-from fakes.whole_robot import PATIENCE, Seen, WholeRobot, entered, listening_after, whole_robot
+from fakes.whole_robot import WholeRobot, entered
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(900)]
 
@@ -104,18 +102,6 @@ STATES: dict[str, Reach] = {
 }
 
 
-@dataclass(frozen=True)
-class Cell:
-    """How one case went: s from the end of the fault until s3, and until a request was served; or what went wrong."""
-
-    listening: float
-    served: float
-    problem: str = ""
-
-
-Table = dict[tuple[str, str, str], Cell]
-
-
 def rapps(folder: Path) -> list[Path]:
     """The RApps that lead the core agent into its states."""
     made = [write_rapp(folder / name, name, body, permissions=PERMISSIONS) for name, body in ENTRY.items()]
@@ -141,70 +127,25 @@ def suffer(robot: WholeRobot, state: str, name: str, how: str) -> Cell:
     back = time.monotonic()
     robot.thaw_all()
     served = serve(robot)
-    listened = next(seen for seen in reversed(robot.seen) if seen.time < served.time and entered("s3")(seen))
     robot.until_only_the_spare_runs()
-    return Cell(max(0.0, listened.time - back), served.time - back)
-
-
-def serve(robot: WholeRobot) -> Seen:
-    """Ask for a RApp until it was run to its end; gives when it spoke."""
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        since = len(robot.seen)
-        robot.ask("fine")
-        with suppress(AssertionError):
-            spoken = robot.until(lambda seen: seen.kind == "said" and seen.detail == "fine", since, 5.0)
-            robot.until(listening_after(spoken), since)
-            return spoken
-        assert time.monotonic() < deadline, f"it is not served again\n{robot.story(since)}"
-
-
-def column(folder: Path, packages: list[Path], fault: tuple[str, str]) -> Table:
-    """All states with one fault, on one robot; a case that fails gives the next one a new robot."""
-    table: Table = {}
-    states = list(STATES)
-    while states:
-        robot = WholeRobot(folder / f"robot-{len(states)}", packages)
-        with whole_robot(robot):
-            serve(robot)
-            while states:
-                state = states.pop(0)
-                try:
-                    table[(state, *fault)] = suffer(robot, state, *fault)
-                except Exception as error:  # noqa: BLE001 - whatever it is, it is this cell's, and the table goes on
-                    table[(state, *fault)] = Cell(0.0, 0.0, f"{type(error).__name__}: {error}"[-6000:])
-                    break
-    return table
+    return Cell(max(0.0, listened_before(robot, served).time - back), served.time - back)
 
 
 @pytest.fixture(scope="module")
-def table(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Table]:
+def table(tmp_path_factory: pytest.TempPathFactory) -> Cells:
     """All cases; printed at the end."""
-    folder = tmp_path_factory.mktemp("faults")
-    packages = rapps(folder / "rapps")
-    cells: Table = {}
-    with ThreadPoolExecutor(len(FAULTS) // 2) as pool:
-        for part in pool.map(lambda fault: column(folder / " ".join(fault).replace(" ", "-"), packages, fault), FAULTS):
-            cells |= part
-    show(cells)
-    yield cells
+    folder, cases = tmp_path_factory.mktemp("faults"), FaultTable(list(STATES), FAULTS, suffer)
+    cells = cases.fill(folder, rapps(folder / "rapps"), at_once=len(FAULTS) // 2)
+    cases.show(f"s until the robot listens again / serves a request again, after the process is back (bound {BOUND:g} s)", cells)
+    return cells
 
 
-def show(cells: Table) -> None:
-    print(f"\ns until the robot listens again / serves a request again, after the process is back (bound {BOUND:g} s)")
-    print(f"{'':14}" + "".join(f"{name + ' ' + how:>19}" for name, how in FAULTS))
-    for state in STATES:
-        row = [cells[(state, *fault)] for fault in FAULTS]
-        texts = ["failed" if cell.problem else f"{cell.listening:.1f} / {cell.served:.1f}" for cell in row]
-        print(f"{state:14}" + "".join(f"{text:>19}" for text in texts))
-
-
-def test_l07_a_core_agent_killed_in_every_state_comes_back_to_a_known_one_without_orphans(table: Table) -> None:
+def test_l07_a_core_agent_killed_in_every_state_comes_back_to_a_known_one_without_orphans(table: Cells) -> None:
     """That the robot is at rest then, is seen by `test_guard` and `test_motion_faults`."""
     assert {state: table[state, "core_agent", "killed"].problem for state in STATES} == dict.fromkeys(STATES, "")
 
 
 @pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize(("name", "how"), FAULTS)
-def test_the_robot_listens_again_and_nothing_is_left(table: Table, state: str, name: str, how: str) -> None:
+def test_the_robot_listens_again_and_nothing_is_left(table: Cells, state: str, name: str, how: str) -> None:
     assert not table[state, name, how].problem

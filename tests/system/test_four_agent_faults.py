@@ -7,20 +7,18 @@ One table, states x faults, printed at the end; as in `test_faults`, which has t
 import os
 import signal
 import time
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from fakes.fault_table import Cell, Cells, FaultTable, listened_before, serve
 from fakes.rapps import write_four_agent_rapp, write_rapp
-from fakes.whole_robot import PATIENCE, Seen, WholeRobot, entered, inside, listening_after, whole_robot
+from fakes.whole_robot import PATIENCE, WholeRobot, inside
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(900)]
 
 AWAY = 1.5  # s a process is away
+SERVED = 2 * PATIENCE  # s to be served again
 BOUND = 25.0  # s to listen again: a silent cloud agent is given up after 5 s, a call of the cloud after its own time
 PROCESSES = ("rosbridge", "link", "cloud", "core_agent")  # started again by the test, as their supervisor does
 AGENTS = {"a_cloud": "rapp_hop.cloud_agent_runner", "a_dyn": "rapp_api.runner"}  # gone for good
@@ -58,18 +56,6 @@ REACHED = {
 PERMISSIONS = {"core": ["rapp_say"], "cloud": []}
 
 
-@dataclass(frozen=True)
-class Cell:
-    """How one case went: s from the end of the fault until s3, and until nothing was left; or what went wrong."""
-
-    listening: float
-    clean: float
-    problem: str = ""
-
-
-Table = dict[tuple[str, str, str], Cell]
-
-
 def rapps(folder: Path) -> list[Path]:
     made = [write_rapp(folder / "fine", "fine", "communication.rapp_say('fine')", permissions=PERMISSIONS)]
     for state, (body, before) in RAPPS.items():
@@ -91,8 +77,7 @@ def suffer(robot: WholeRobot, state: str, name: str, how: str) -> Cell:
         time.sleep(AWAY)
         robot.thaw(name) if how == "frozen" else robot.start(name)
     back = time.monotonic()
-    served = serve(robot)
-    listened = next(seen for seen in reversed(robot.seen) if seen.time < served.time and entered("s3")(seen))
+    listened = listened_before(robot, serve(robot, SERVED))
     assert listened.time - back < BOUND, f"it has listened again after {listened.time - back:.1f} s only"
     robot.until_only_the_spare_runs()
     robot.until_only_the_cloud_spare_runs()
@@ -108,61 +93,17 @@ def strike(robot: WholeRobot, name: str, how: str) -> None:
     os.kill(pid, signal.SIGSTOP if how == "frozen" else signal.SIGKILL)
 
 
-def serve(robot: WholeRobot) -> Seen:
-    """Ask for a RApp until it was run to its end; gives when it spoke."""
-    deadline = time.monotonic() + 2 * PATIENCE
-    while True:
-        since = len(robot.seen)
-        with suppress(AssertionError):
-            robot.ask("fine")
-            spoken = robot.until(lambda seen: seen.kind == "said" and seen.detail == "fine", since, 5.0)
-            robot.until(listening_after(spoken), since)
-            return spoken
-        assert time.monotonic() < deadline, f"it is not served again\n{robot.story(since)}"
-
-
-def column(folder: Path, packages: list[Path], fault: tuple[str, str]) -> Table:
-    """All states with one fault, on one robot; a case that fails gives the next one a new robot."""
-    table: Table = {}
-    states = list(RAPPS)
-    while states:
-        robot = WholeRobot(folder / f"robot-{len(states)}", packages)
-        with whole_robot(robot, "roscore", "cloud", "nao_sim", "rosbridge", "link", "core_agent"):
-            serve(robot)
-            while states:
-                state = states.pop(0)
-                try:
-                    table[(state, *fault)] = suffer(robot, state, *fault)
-                except Exception as error:  # noqa: BLE001 - whatever it is, it is this cell's, and the table goes on
-                    story = f"{type(error).__name__}: {error}\n{robot.story(max(0, len(robot.seen) - 80))}"
-                    table[(state, *fault)] = Cell(0.0, 0.0, story[-12000:])
-                    break
-    return table
-
-
 @pytest.fixture(scope="module")
-def table(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Table]:
+def table(tmp_path_factory: pytest.TempPathFactory) -> Cells:
     """All cases; printed at the end."""
     folder = tmp_path_factory.mktemp("four")
-    packages = rapps(folder / "rapps")
-    cells: Table = {}
-    with ThreadPoolExecutor(4) as pool:
-        for part in pool.map(lambda fault: column(folder / "-".join(fault), packages, fault), FAULTS):
-            cells |= part
-    show(cells)
-    yield cells
-
-
-def show(cells: Table) -> None:
-    print(f"\ns until the robot listens again (bound {BOUND:g} s) / nothing is left (bound {PATIENCE:g} s)")
-    print(f"{'':9}" + "".join(f"{name + ' ' + how:>19}" for name, how in FAULTS))
-    for state in RAPPS:
-        row = [cells[(state, *fault)] for fault in FAULTS]
-        texts = ["failed" if cell.problem else f"{cell.listening:.1f} / {cell.clean:.1f}" for cell in row]
-        print(f"{state:9}" + "".join(f"{text:>19}" for text in texts))
+    cases = FaultTable(list(RAPPS), FAULTS, suffer, SERVED, ("roscore", "cloud", "nao_sim", "rosbridge", "link", "core_agent"))
+    cells = cases.fill(folder, rapps(folder / "rapps"), at_once=4)
+    cases.show(f"s until the robot listens again (bound {BOUND:g} s) / nothing is left (bound {PATIENCE:g} s)", cells)
+    return cells
 
 
 @pytest.mark.parametrize("state", RAPPS)
 @pytest.mark.parametrize(("name", "how"), FAULTS)
-def test_the_robot_listens_again_and_nothing_is_left(table: Table, state: str, name: str, how: str) -> None:
+def test_the_robot_listens_again_and_nothing_is_left(table: Cells, state: str, name: str, how: str) -> None:
     assert not table[state, name, how].problem
