@@ -138,6 +138,21 @@ def test_versions_come_and_go(cloud: CloudProcess, someone: Callable[[str], Prov
     assert deeds == [("publish", "post 1.0.0"), ("publish", "post 1.1.0"), ("yank", "post 1.1.0"), ("renew", "list 5")]
 
 
+def test_both_packages_of_a_four_agent_rapp(
+    cloud: CloudProcess, someone: Callable[[str], Provider], capsys: Capsys, tmp_path: Path
+) -> None:
+    karl = someone("karl")
+    karl.join(capsys, "kitchen")
+    own = {"agent": "cloud", "keywords": {}, "sentences": {}, "permissions": {"core": [], "cloud": []}}
+    Path(rapp(tmp_path, "kitchen_cloud", **own)).rename(tmp_path / "cloud")
+    Path(rapp(tmp_path, "kitchen", partner="kitchen_cloud")).rename(tmp_path / "dynamic")
+    assert karl.far(capsys, "publish", str(tmp_path)) == 1 and "./rapp keys grant karl kitchen_cloud" in karl.err
+    assert karl.owner(capsys, "keys", "grant", "karl", "kitchen_cloud") == 0
+    assert karl.far(capsys, "publish", str(tmp_path)) == 0, karl.err
+    assert [line.split(",")[0] for line in karl.out.splitlines()] == ["on offer: kitchen_cloud 1.0.0", "on offer: kitchen 1.0.0"]
+    assert listed(cloud)["kitchen"] == "1.0.0" and "kitchen_cloud" not in listed(cloud)
+
+
 def test_a_new_key_at_home(cloud: CloudProcess, someone: Callable[[str], Provider], capsys: Capsys, tmp_path: Path) -> None:
     nina = someone("nina")
     nina.join(capsys, "note")

@@ -16,7 +16,7 @@ from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
 from rapp_hop.hz.application import first_list
 from rapp_hop.hz.archive import build, inspect
 from rapp_hop.hz.tar import Limits
-from rapp_hop.hz.trust import TrustedStore, Versions
+from rapp_hop.hz.trust import Attack, TrustedStore, Untrusted, Versions
 
 QUOTA = 2**20
 
@@ -288,6 +288,18 @@ def test_applications_that_are_not_taken(shelf: Shelf, maria: Publisher, tmp_pat
         with pytest.raises(Refused, match="that is no publisher"):
             shelf.custody.rotate(name, eve.application())
     assert [holder.name for holder in shelf.custody.publishers()] == ["maria", "rapp"]
+
+
+def test_nothing_is_signed_for_a_store_that_went_back(shelf: Shelf, maria: Publisher, tmp_path: Path) -> None:
+    hand_in(shelf, maria, package(tmp_path))
+    shutil.copytree(shelf.metadata, tmp_path / "old")
+    hand_in(shelf, maria, package(tmp_path, version="1.1.0"))
+    assert set(maria.standing.own.targets) == {"clock-1.0.0.hz", "clock-1.1.0.hz"}
+    shutil.rmtree(shelf.metadata)
+    (tmp_path / "old").rename(shelf.metadata)
+    with pytest.raises(Untrusted) as caught:
+        maria.list_with(package(tmp_path, version="1.2.0"))
+    assert caught.value.attack == Attack.ROLLBACK
 
 
 def test_the_platform_needs_no_key_that_publishes(shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path: Path) -> None:
