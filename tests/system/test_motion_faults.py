@@ -10,7 +10,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +26,7 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 SILENT = 1.0  # s without heartbeat after which a lease is silent
 STOPPED = 0.3  # s from then on within which motion has stopped
 FELT = 0.2  # s until a touch is felt
+HEARD = 1.0  # s from the end of a word until it is recognised: the end-pointer waits for 0.45 s
 GUARDED = 1.0  # s from the core agent's end to a still robot
 UNSEEN = guard.EVERY * guard.SILENT  # s for the guard to see that the core agent stands still
 BUSY = 1.0  # s that a busy machine may add: three processes have to get their turns
@@ -90,10 +91,22 @@ for _ in range(40):
     wheels.publish(message)
     self.pause(0.05)"""
 RISES = "from rapp_api import navigation\nnavigation.take_predefined_posture('StandInit', 1.0)"
-STOPPED_BY_HAND = "You have stopped it"
+STOPPED_BY_PERSON = "You have stopped it"
+LISTENS = "from rapp_api import communication\ncommunication.rapp_recognize(['yes', 'no', 'Elizabeth'], 60.0)"
+PERSON = "en-us+m3"
 FAILED = "It has failed"  # so says the robot when the RApp may not even publish
 
 took: dict[str, tuple[float, float]] = {}
+
+
+class HearingRobot(WholeRobot):
+    """Its microphone hears sound."""
+
+    def _words(self, name: str) -> list[str]:
+        return ["sound" if word == "text" else word for word in super()._words(name)]
+
+    def say(self, text: str) -> None:
+        self.room("personSay", text, PERSON)
 
 
 @pytest.fixture(scope="module")
@@ -251,10 +264,56 @@ def test_l11_a_hand_on_its_head_stops_a_rapp_in_the_middle_of_a_walk(robot: Whol
     with watched(robot) as watch:
         touched = in_the_middle(robot, watch, "move_to")
         robot.room("touch", "MiddleTactil", 0.3)
-        robot.until(lambda seen: (seen.kind, seen.detail) == ("said", STOPPED_BY_HAND), since)
+        robot.until(lambda seen: (seen.kind, seen.detail) == ("said", STOPPED_BY_PERSON), since)
         until_resting(robot)
     check("head touched, move_to", watch.went_on(KINDS["move_to"], touched.time), FELT + STOPPED)
     robot.until_only_the_spare_runs()
+
+
+@pytest.fixture(scope="module")
+def hearing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HearingRobot]:
+    robot = HearingRobot(tmp_path_factory.mktemp("hearing"), body=True)
+    robot.settings = SETTINGS
+    walk = BODY.format(call=KINDS["move_to"].call)
+    install_rapp(robot.home, "move_to", walk, keywords=("kitchen",), permissions=PERMISSIONS)
+    permissions = {"core": ["rapp_recognize"], "cloud": []}
+    install_rapp(robot.home, "listener", LISTENS, keywords=("telephone",), permissions=permissions)
+    with whole_robot(robot, "roscore", "nao_sim", "core_agent"):
+        yield robot
+
+
+def say_stop(robot: WholeRobot, since: int) -> float:
+    """Say it until it is heard; gives the simulated time at which it had been said the last time."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        robot.say("stop")
+        said = float(robot.room("getTime"))
+        with suppress(AssertionError):
+            robot.until(lambda seen: (seen.state, seen.kind, seen.detail) == ("s9", "heard", "stop"), since, 2.0)
+            robot.until(lambda seen: (seen.kind, seen.detail) == ("said", STOPPED_BY_PERSON), since)
+            return said
+    raise AssertionError(f"the word was not heard\n{robot.story(since)}")
+
+
+def test_l11_the_spoken_word_stops_a_rapp_in_the_middle_of_a_walk(hearing: HearingRobot) -> None:
+    since = len(hearing.seen)
+    with watched(hearing) as watch:
+        watch.until(lambda _now: bool(watch.moments))
+        hearing.ask("kitchen")
+        watch.until(lambda now: walked(watch.moments[0], now) > KINDS["move_to"].middle)
+        said = say_stop(hearing, since)
+        until_resting(hearing)
+    check("“stop” said, move_to", watch.went_on(KINDS["move_to"], said), HEARD + STOPPED)
+    hearing.until_only_the_spare_runs()
+
+
+def test_l11_the_spoken_word_is_heard_while_the_rapp_listens_for_others(hearing: HearingRobot) -> None:
+    since = len(hearing.seen)
+    hearing.ask("telephone")
+    hearing.until(lambda seen: seen.detail == "core->ALSpeechRecognition subscribe", since)
+    say_stop(hearing, since)
+    hearing.until(lambda seen: seen.state == "s3" and seen.kind == "entered", since)
+    hearing.until_only_the_spare_runs()
 
 
 @pytest.mark.parametrize("name", ["move_to", "move_joint"])

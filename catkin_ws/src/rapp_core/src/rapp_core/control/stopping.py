@@ -60,7 +60,7 @@ class Stopping:
                     return
             except CoreError as error:
                 _log.info("%s", error)
-                attends = False
+                attends = attends and not isinstance(error, Unreachable)
                 over.wait(RETRY)
 
     def _attend(self, call: Call, over: threading.Event) -> bool:

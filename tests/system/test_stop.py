@@ -1,0 +1,231 @@
+"""The person stops the robot, by a hand on its head or by the word, in each state of the core FSM in which it does something; and
+a RApp that keeps failing is not started again and again. L11 and L13 of the list of faults.
+
+That a walk ends in time, and that the word is heard as sound, is seen by `test_motion_faults`.
+"""
+
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from fakes.rapps import write_four_agent_rapp, write_rapp
+from fakes.whole_robot import PATIENCE, Seen, WholeRobot, entered, listening_after, whole_robot
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+
+STOPPED = "You have stopped it"
+HEAD = "Device/SubDeviceList/Head/Touch/Middle/Sensor/Value"
+AGAIN = 0.3  # s until the person says the word once more
+ENTRY = {
+    "lazy": "communication.rapp_say('here')\nself.pause(60)",
+    "listener": "communication.rapp_recognize(['yes', 'no'], 60.0)",
+    "recorder": "communication.rapp_record(60.0)",
+    "caller": "cloud.call_wait('profile', timeout=60)",
+    "fine": "communication.rapp_say('fine')",
+    "breaks": "raise ValueError('on purpose')",
+}
+PERMISSIONS = {"core": ["rapp_say", "rapp_recognize", "rapp_record"], "cloud": ["profile"]}
+SERVICE = "from rapp_hop.cloud_agent import service\n\n\n@service\ndef quick() -> str:\n    return 'quick'\n"
+TWINS = "please start one of the twins"
+FINE = "would you be so kind and run the program that is fine"
+
+
+def rapps(folder: Path) -> list[Path]:
+    made = [write_rapp(folder / name, name, body, permissions=PERMISSIONS) for name, body in ENTRY.items()]
+    made.append(write_rapp(folder / "fresh", "fresh", "pass"))
+    slow = write_rapp(folder / "slow", "slow", "pass")
+    (slow / "agent.py").write_text("import time\ntime.sleep(60)\n" + (slow / "agent.py").read_text())
+    made += [write_rapp(folder / name, name, "pass", sentences={"en": [TWINS]}) for name in ("castor", "pollux")]
+    body = "cloud.call_agent_wait('quick')\ncommunication.rapp_say('here')\nself.pause(60)"
+    return [*made, slow, *write_four_agent_rapp(folder, "four", body, SERVICE, permissions=PERMISSIONS)]
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WholeRobot]:
+    folder = tmp_path_factory.mktemp("stop")
+    robot = WholeRobot(folder / "robot", rapps(folder / "rapps"))
+    robot.settings = "first_word = 60.0\nhang = 120.0\n"
+    robot.failures = 3
+    with whole_robot(robot, "roscore", "cloud", "nao_sim", "rosbridge", "link", "core_agent"):
+        lift_hand(robot)
+        yield robot
+
+
+def lay_hand(robot: WholeRobot) -> None:
+    """On the middle of its head."""
+    robot.naoqi.call("ALMemory", "insertData", HEAD, 1.0)
+
+
+def lift_hand(robot: WholeRobot) -> None:
+    robot.naoqi.call("ALMemory", "insertData", HEAD, 0.0)
+
+
+def said(words: str) -> Callable[[Seen], bool]:
+    return lambda seen: (seen.kind, seen.detail) == ("said", words)
+
+
+def by_hand(robot: WholeRobot, since: int) -> Seen:
+    lay_hand(robot)
+    try:
+        return robot.until(said(STOPPED), since)
+    finally:
+        lift_hand(robot)
+
+
+def by_word(robot: WholeRobot, since: int) -> Seen:
+    """The person says it until the robot tells that it has heard it."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        robot.say("stop")
+        with suppress(AssertionError):
+            return robot.until(said(STOPPED), since, AGAIN)
+    raise AssertionError(f"the word was not heard\n{robot.story(since)}")
+
+
+def command(robot: WholeRobot, text: str) -> None:
+    """The person says a whole sentence, again when it was not heard."""
+    since = len(robot.seen)
+    for _ in range(4):
+        robot.room("personSay", text, "en-us+m3", {"speed": 200.0})
+        with suppress(AssertionError):
+            robot.until(entered("s5"), since, 5.0)
+            return
+    raise AssertionError(f"{text!r} was not heard\n{robot.story(since)}")
+
+
+Stop = Callable[[WholeRobot, int], Seen]
+
+
+@contextmanager
+def platform_stands_still(robot: WholeRobot) -> Iterator[None]:
+    robot.freeze("cloud")
+    try:
+        yield
+    finally:
+        robot.thaw("cloud")
+
+
+def stop_at(robot: WholeRobot, stop: Stop, since: int, reached: Callable[[Seen], bool]) -> list[str]:
+    """Stop the robot once something has happened; gives the states from there to s3, when nothing of the run is left."""
+    begun = robot.until(reached, since)
+    told = stop(robot, since)
+    robot.until(listening_after(told), since)
+    robot.until_only_the_spare_runs()
+    robot.until_only_the_cloud_spare_runs()
+    later = robot.seen[robot.seen.index(begun) :]
+    return [seen.state for seen in later if (seen.agent, seen.machine, seen.kind) == ("core", "core", "entered")]
+
+
+both = pytest.mark.parametrize("stop", [by_hand, by_word])
+
+
+def test_l11_s4_a_hand_that_lies_on_its_head_lets_nothing_begin(robot: WholeRobot) -> None:
+    since = len(robot.seen)
+    lay_hand(robot)
+    robot.ask("slow")
+    assert stop_at(robot, by_hand, since, entered("s4"))[-2:] == ["s11", "s3"]
+    assert robot.said(since) == [STOPPED]
+
+
+@both
+def test_l11_s5_what_the_platform_understands_is_not_waited_for(robot: WholeRobot, stop: Stop) -> None:
+    since = len(robot.seen)
+    with platform_stands_still(robot):
+        command(robot, FINE)
+        assert stop_at(robot, stop, since, entered("s5")) == ["s5", "s11", "s3"]
+    assert "core->link cancel interpret (asynchronous)" in robot.messages(since)
+
+
+@both
+def test_l11_s6_a_download_is_given_up(robot: WholeRobot, stop: Stop) -> None:
+    since = len(robot.seen)
+    with platform_stands_still(robot):
+        robot.ask("fresh")
+        assert stop_at(robot, stop, since, entered("s6")) == ["s6", "s11", "s3"]
+    assert "core->link cancel install fresh (asynchronous)" in robot.messages(since)
+    assert not (robot.home / "rapps" / "fresh" / "current").exists()
+
+
+@both
+@pytest.mark.parametrize("state", ["s7", "s8"])
+def test_l11_s7_s8_a_rapp_that_starts_is_ended(robot: WholeRobot, stop: Stop, state: str) -> None:
+    since = len(robot.seen)
+    robot.ask("slow")
+    states = stop_at(robot, stop, since, entered(state))
+    assert states[states.index("s8") :] == ["s8", "s10", "s11", "s3"]
+    assert robot.said(since) == [STOPPED]
+
+
+@pytest.mark.parametrize(
+    ("stop", "name", "reached"),
+    [
+        (by_hand, "lazy", said("here")),
+        (by_word, "lazy", said("here")),
+        (by_word, "listener", lambda seen: seen.detail == "core->ALSpeechRecognition subscribe"),
+        (by_word, "recorder", lambda seen: "startMicrophonesRecording" in seen.detail),
+        (by_word, "four", said("here")),
+    ],
+    ids=["hand, idle", "word, idle", "word, listening", "word, recording", "word, four agents"],
+)
+def test_l11_s9_a_rapp_that_runs_is_ended_whatever_it_does(
+    robot: WholeRobot, stop: Stop, name: str, reached: Callable[[Seen], bool]
+) -> None:
+    since = len(robot.seen)
+    robot.ask(name)
+    assert stop_at(robot, stop, since, reached) == ["s10", "s11", "s3"]
+    assert [words for words in robot.said(since) if words != "here"] == [STOPPED]
+
+
+def test_l11_s9_a_rapp_that_waits_for_the_platform_is_ended(robot: WholeRobot) -> None:
+    since = len(robot.seen)
+    robot.ask("caller", "s9")
+    robot.until_listening(since)
+    since = len(robot.seen)
+    with platform_stands_still(robot):
+        robot.ask("caller")
+        begun = robot.until(lambda seen: seen.detail == "core->link call profile", since)
+        robot.until(listening_after(by_word(robot, since)), since)
+    assert not any(seen.detail == "link->core reply call profile" for seen in robot.seen[robot.seen.index(begun) :])
+    robot.until_only_the_spare_runs()
+
+
+@both
+def test_l11_s12_a_question_is_given_up(robot: WholeRobot, stop: Stop) -> None:
+    since = len(robot.seen)
+    command(robot, TWINS)
+    assert stop_at(robot, stop, since, entered("s12")) == ["s12", "s11", "s3"]
+
+
+def run(robot: WholeRobot, name: str) -> str:
+    """Ask for a RApp; gives what the robot says until it listens again."""
+    since = len(robot.seen)
+    robot.ask(name)
+    robot.until(listening_after(robot.until(entered("s6"), since)), since)
+    (words,) = robot.said(since)
+    return words
+
+
+def test_l13_a_rapp_that_keeps_failing_is_not_started_until_there_is_another_version(robot: WholeRobot) -> None:
+    refusal = "breaks keeps failing, I will not start it before "
+    assert [run(robot, "breaks") for _ in range(3)] == ["It has failed"] * 3
+    assert run(robot, "breaks").startswith(refusal)
+    robot.stop("core_agent")
+    since = len(robot.seen)
+    robot.start("core_agent")
+    robot.until_listening(since)
+    assert run(robot, "breaks").startswith(refusal)
+    assert run(robot, "fine") == "fine"
+    robot.stop("link")  # so that the older version of the store is not fetched again
+    folder = robot.home / "rapps" / "breaks"
+    shutil.copytree(folder / "1.0.0", folder / "1.0.1")
+    manifest = folder / "1.0.1" / "package.json"
+    manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "version": "1.0.1"}))
+    (folder / "new").symlink_to("1.0.1")
+    (folder / "new").rename(folder / "current")
+    assert run(robot, "breaks") == "It has failed"
+    robot.start("link")
