@@ -1,7 +1,7 @@
 """The robot has words of its own for every attack that its link can name."""
 
-from rapp_core.control.refusals import AWAY, not_installed
-from rapp_core.errors import CoreError, Refused, Unreachable
+from rapp_core.control.refusals import AWAY, not_activated, not_installed
+from rapp_core.errors import NO_RUNTIME, CoreError, Refused, Unreachable
 from rapp_hop.hz.attacks import Attack
 
 
@@ -23,3 +23,10 @@ def test_slow_retrieval_is_said_though_it_may_be_tried_again() -> None:
 def test_without_a_reason() -> None:
     assert said(Unreachable("away")) == AWAY
     assert said(Refused("disk full")) == "I cannot install voice mail"
+
+
+def test_a_rapp_in_a_language_that_is_not_here() -> None:
+    error = Refused("cannot start probe: it is written in JavaScript")
+    assert not_activated(error) == "I cannot start it"
+    error.reason = NO_RUNTIME
+    assert not_activated(error) == "I cannot start it, I lack what it is written in"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from fakes.rapps import write_rapp
-from rapp_core.errors import Invalid, Refused
+from rapp_core.errors import NO_RUNTIME, Invalid, Refused
 from rapp_core.launcher.runtimes import check_runtime
 from rapp_core.manifest import read_manifest
 
@@ -26,8 +26,9 @@ def test_javascript_runs_where_node_and_its_websockets_are(package: Path, tmp_pa
 def test_without_them_it_is_refused_with_the_next_step(
     package: Path, tmp_path: Path, node: str, library: str, missing: str
 ) -> None:
-    with pytest.raises(Refused, match=f"cannot start probe: .* JavaScript.*; install the Debian packages {missing}$"):
+    with pytest.raises(Refused, match=f"cannot start probe: .* JavaScript.*; install the Debian packages {missing}$") as refused:
         check_runtime(read_manifest(package), node=tmp_path / node, library=tmp_path / library)
+    assert refused.value.reason == NO_RUNTIME
 
 
 def test_python_needs_neither(tmp_path: Path) -> None:

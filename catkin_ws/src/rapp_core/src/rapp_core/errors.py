@@ -2,7 +2,7 @@
 
 
 class CoreError(Exception):
-    """Root of the core agent's errors; `reason` is the link's word for what exactly was wrong, where it has one."""
+    """Root of the core agent's errors; `reason` is a word for what exactly was wrong, the link's or NO_RUNTIME, if any."""
 
     kind = "bug"
     reason = ""
@@ -34,3 +34,6 @@ class Bug(CoreError):  # noqa: N818
 
 KINDS: dict[str, type[CoreError]] = {error.kind: error for error in (Refused, Unreachable, Invalid, Bug)}
 """Error class of each kind."""
+
+NO_RUNTIME = "no runtime"
+"""Reason of a Refused: what a RApp is written in is not installed on this robot."""

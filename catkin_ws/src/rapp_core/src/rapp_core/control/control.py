@@ -9,7 +9,7 @@ from rapp_core.control.listening import Listener
 from rapp_core.control.parts import Parts
 from rapp_core.control.quarantine import Quarantine
 from rapp_core.control.question import which
-from rapp_core.control.refusals import not_installed, not_interpreted, not_started
+from rapp_core.control.refusals import not_activated, not_installed, not_interpreted, not_started
 from rapp_core.control.stopping import Stopping
 from rapp_core.control.trial import Trial
 from rapp_core.control.words import NONE_OF_THEM, NOT_UNDERSTOOD, READY, READY_ALONE, STOPPED
@@ -153,7 +153,7 @@ class Control:
         try:
             self._run = parts.launcher.activate(package, self._trial.told)
         except CoreError as error:
-            self._problem(share, "I cannot start it", error)
+            self._problem(share, not_activated(error), error)
             if isinstance(error, Invalid):
                 self._trial.failed(str(error))
                 self._judge(share, None)

@@ -1,6 +1,6 @@
 """Why something was not installed, not interpreted or not started, in words for the person. Pure."""
 
-from rapp_core.errors import CoreError, Unreachable
+from rapp_core.errors import NO_RUNTIME, CoreError, Unreachable
 
 AWAY = "I cannot reach the platform"
 ODD = "The platform does not answer as it should"
@@ -36,3 +36,8 @@ def not_interpreted(error: CoreError) -> str:
 def not_started(error: CoreError) -> str:
     """What to say of a RApp whose cloud agent was not started."""
     return AWAY if isinstance(error, Unreachable) else "I cannot start its part in the cloud"
+
+
+def not_activated(error: CoreError) -> str:
+    """What to say of a RApp whose dynamic agent was not started."""
+    return "I cannot start it, I lack what it is written in" if error.reason == NO_RUNTIME else "I cannot start it"

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rapp_core.errors import Refused
+from rapp_core.errors import NO_RUNTIME, Refused
 from rapp_core.launcher.sandbox import BRIDGE, is_here
 from rapp_core.manifest import JAVASCRIPT, Manifest
 
@@ -15,12 +15,9 @@ def check_runtime(manifest: Manifest, node: Path = NODE, library: Path = LIBRARY
     if manifest.runtime != JAVASCRIPT:
         return
     missing = [package for package, path in (("nodejs", node), ("node-ws", library)) if not path.exists()]
-    if missing:
-        raise Refused(
-            f"cannot start {manifest.name}: it is written in JavaScript, which this robot cannot run; "
-            f"install the Debian packages {' and '.join(missing)}"
-        )
-    if not is_here(BRIDGE):
-        raise Refused(
-            f"cannot start {manifest.name}: it is written in JavaScript and needs rosbridge; install {BRIDGE} beside the core agent"
-        )
+    if not missing and is_here(BRIDGE):
+        return
+    steps = f"install the Debian packages {' and '.join(missing)}" if missing else f"install {BRIDGE} beside the core agent"
+    error = Refused(f"cannot start {manifest.name}: it is written in JavaScript, which this robot cannot run; {steps}")
+    error.reason = NO_RUNTIME
+    raise error
