@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rapp_cloud.interpreter.config import InterpreterConfig
-from rapp_cloud.interpreter.matching import chances, match
+from rapp_cloud.interpreter.matching import Offered, chances, match
 from rapp_cloud.interpreter.words import plain
 
 COMMANDS = {
@@ -17,16 +17,17 @@ COMMANDS = {
 CONFIG = InterpreterConfig()
 
 
-def bag(text):
+def bags(texts):
     """Words hashed to 64 places, so that texts with the same words are near."""
-    vector = np.zeros(64)
-    for word in plain(text).split():
-        vector[sum(map(ord, word)) % 64] += 1
-    return vector / max(np.linalg.norm(vector), 1e-9)
+    vectors = np.zeros((len(texts), 64))
+    for vector, text in zip(vectors, texts, strict=True):
+        for word in plain(text).split():
+            vector[sum(map(ord, word)) % 64] += 1
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
 
 
 def meant(*texts, commands=COMMANDS, config=CONFIG):
-    return match([(text, 1 / len(texts)) for text in texts], commands, bag, config)
+    return match([(text, 1 / len(texts)) for text in texts], Offered(commands, bags), bags, config)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -94,13 +95,13 @@ def test_rapp_without_rival_gets_no_margin_for_it():
 
 def test_likelier_text_decides():
     texts = [("what time is it", 0.9), ("will it rain tomorrow", 0.1)]
-    assert match(texts, COMMANDS, bag, CONFIG).candidates[0][0] == "clock"
-    assert match([(t, 1 - p) for t, p in texts], COMMANDS, bag, CONFIG).candidates[0][0] == "weather"
+    assert match(texts, Offered(COMMANDS, bags), bags, CONFIG).candidates[0][0] == "clock"
+    assert match([(t, 1 - p) for t, p in texts], Offered(COMMANDS, bags), bags, CONFIG).candidates[0][0] == "weather"
 
 
 @pytest.mark.parametrize("texts", [[], [("", 1.0)], [("...", 1.0)]])
 def test_nothing_heard_names_none(texts):
-    found = match(texts, COMMANDS, bag, CONFIG)
+    found = match(texts, Offered(COMMANDS, bags), bags, CONFIG)
     assert (found.rapp, found.confidence, found.text) == (None, 0.0, "")
     assert [value for _, value in found.candidates] == [0.0] * 3
 

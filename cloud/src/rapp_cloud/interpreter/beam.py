@@ -60,6 +60,7 @@ class Beam:
     def __init__(self, width: int, start: int, end: int, expected: Expected, bonus: float) -> None:
         self._width, self._end = width, end
         self._expected, self._bonus = expected, bonus
+        self._first = np.fromiter(expected.following, np.intp)
         self._open = [Row((start,), 0.0)]
         self._done: list[Row] = []
 
@@ -87,8 +88,11 @@ class Beam:
 
     def _likely(self, row: Row, chances: NDArray[np.float32]) -> set[int]:
         width = min(self._width, len(chances))
-        likeliest = set(np.argpartition(chances, -width)[-width:].tolist())
-        return likeliest | set(self._expected.following) | set(row.place.following if row.place else ())
+        likeliest: set[int] = set(np.argpartition(chances, -width)[-width:].tolist())
+        # All that go on with an expected word earn the same, but for words that were found before: of many, the likeliest do.
+        most = 2 * self._width + len(row.found)
+        following = np.fromiter(row.place.following, np.intp) if row.place else self._first[:0]
+        return likeliest | _likeliest(self._first, chances, most) | _likeliest(following, chances, most)
 
     def _grow(self, row: Row, piece: int, chance: float) -> Row:
         node = row.place.following.get(piece) if row.place else None
@@ -111,3 +115,9 @@ class Beam:
             return True
         # a row's worth can still rise by expected words, so wait until it is clearly behind
         return len(self._done) == self._width and self._open[0].worth + 2 * self._bonus < self._done[-1].worth
+
+
+def _likeliest(pieces: NDArray[np.intp], chances: NDArray[np.float32], most: int) -> set[int]:
+    if len(pieces) > most:
+        pieces = pieces[np.argpartition(chances[pieces], -most)[-most:]]
+    return set(pieces.tolist())

@@ -39,3 +39,5 @@ class InterpreterConfig:
     commands and foreign sentences is asked about up to 0.3; "tell me the time and say hello to me" is 0.12 apart."""
     most_asked: int = 3
     """RApps of one question."""
+    most_candidates: int = 50
+    """RApps of one answer; it goes to the robot whole."""

@@ -7,8 +7,9 @@ from pathlib import Path
 from rapp_cloud.interpreter.beam import Expected
 from rapp_cloud.interpreter.config import InterpreterConfig
 from rapp_cloud.interpreter.errors import Refused
-from rapp_cloud.interpreter.matching import chances, match
-from rapp_cloud.interpreter.meaning import SentenceModel, weights_file
+from rapp_cloud.interpreter.kept import KeptVectors
+from rapp_cloud.interpreter.matching import Offered, chances, match
+from rapp_cloud.interpreter.meaning import MODEL, SentenceModel, weights_file
 from rapp_cloud.interpreter.port import Commands, Interpretation
 from rapp_cloud.interpreter.sound import read_sound, reduce_noise
 from rapp_cloud.interpreter.speech import Recogniser, model_folder
@@ -23,27 +24,44 @@ class HearingInterpreter:
 
     def __init__(self, config: InterpreterConfig, recogniser: Recogniser, sentences: SentenceModel) -> None:
         self._config, self._recogniser, self._sentences = config, recogniser, sentences
-        self._expect = lru_cache(maxsize=8)(self._make_expected)
+        self._commands: Commands | None = None
+        self._offered: Offered | None = None
+        self._expected = Expected()
+
+    def learn(self, sentences: Sequence[str]) -> None:
+        """Work out what takes long, before a recording is interpreted against these sentences."""
+        self._sentences.learn(sentences)
 
     def interpret(self, recording: Path, commands: Commands, language: str = "en") -> Interpretation:
         """Say which RApp a recorded sentence asks for (see `Interpreter.interpret`)."""
         if language not in LANGUAGES:
             raise Refused(f"cannot interpret language {language[:20]!r}: offered are {', '.join(LANGUAGES)}")
         sound = reduce_noise(read_sound(recording, self._config.longest_recording), floor=self._config.spectral_floor)
-        words = content_words([text for sentences in commands.values() for text in sentences])
-        heard = self._recogniser.listen(sound, self._config.beam, self._expect(tuple(words)), self._config.word_bonus)
+        offered = self._ready_for(commands)
+        heard = self._recogniser.listen(sound, self._config.beam, self._expected, self._config.word_bonus)
         weighed = chances([text.score + text.bonus for text in heard])
         texts = [(text.text, chance) for text, chance in zip(heard, weighed, strict=True)]
-        return match(texts, commands, self._sentences.vector, self._config)
+        return match(texts, offered, self._sentences.vectors, self._config)
 
-    def _make_expected(self, words: Sequence[str]) -> Expected:
-        return self._recogniser.expect(words)
+    def _ready_for(self, commands: Commands) -> Offered:
+        if self._offered is None or commands != self._commands:
+            self._offered = Offered(commands, self._sentences.learnt)
+            words = content_words([text for sentences in commands.values() for text in sentences])
+            self._expected, self._commands = self._recogniser.expect(words), commands
+        return self._offered
 
 
-def make_interpreter() -> HearingInterpreter:
-    """Load the models; the set-up function of a worker process (picklable by name). Raises Bug: models not installed."""
+def make_interpreter(cache: Path | None = None) -> HearingInterpreter:
+    """Load the models; the set-up function of a worker process (picklable by name). Raises Bug: models not installed.
+
+    :param cache: folder for what was worked out once; None: none
+    """
     vocabulary = Path(__file__).with_name("wordpiece.txt")
-    return HearingInterpreter(InterpreterConfig(), Recogniser(model_folder()), SentenceModel(weights_file(), vocabulary))
+    kept = None
+    if cache is not None:
+        cache.mkdir(parents=True, exist_ok=True, mode=0o700)
+        kept = KeptVectors(cache / f"{MODEL}.vectors")
+    return HearingInterpreter(InterpreterConfig(), Recogniser(model_folder()), SentenceModel(weights_file(), vocabulary, kept))
 
 
 @lru_cache(maxsize=1)

@@ -16,29 +16,64 @@ from rapp_cloud.interpreter.config import InterpreterConfig
 from rapp_cloud.interpreter.port import Commands, Interpretation
 from rapp_cloud.interpreter.words import RareWords, plain
 
-Meaning = Callable[[str], NDArray[Any]]
-"""A text's vector of length 1."""
+Meanings = Callable[[Sequence[str]], NDArray[Any]]
+"""The texts' vectors of length 1, a row each."""
 
 Texts = Sequence[tuple[str, float]]
 """(possible text, its probability), best first."""
 
 
-def match(texts: Texts, commands: Commands, meaning: Meaning, config: InterpreterConfig) -> Interpretation:
+class Offered:
+    """A catalogue made ready for texts to be compared with it; worth keeping while it stays the same."""
+
+    def __init__(self, commands: Commands, meanings: Meanings) -> None:
+        """Take the meanings of all its sentences."""
+        spoken = {name: list(commands[name]) for name in sorted(commands) if any(map(plain, commands[name]))}
+        self.names = tuple(spoken)
+        self.mute = tuple(sorted(commands.keys() - spoken.keys()))  # RApps that nothing can be said for
+        counts = [len(sentences) for sentences in spoken.values()]
+        self._counts = np.array(counts)
+        self._first = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
+        self._owner = np.repeat(np.arange(len(counts)), counts)
+        self._rare = RareWords(spoken)
+        self._senses = meanings([text for sentences in spoken.values() for text in sentences])
+
+    def nearness(self, heard: Texts, meanings: Meanings, config: InterpreterConfig) -> NDArray[np.float64]:
+        """How near what was heard is to each RApp, in the order of `names`."""
+        cosines = self._senses @ meanings([text for text, _ in heard]).T
+        found = np.zeros(len(self.names))
+        for (text, chance), column in zip(heard, cosines.T, strict=True):
+            words = np.maximum.reduceat(self._rare.alike(text), self._first)
+            found += chance * (self._mean_of_best(column, config.sentences_compared) + config.word_weight * words)
+        return found
+
+    def _mean_of_best(self, cosines: NDArray[Any], most: int) -> NDArray[np.float64]:
+        order = np.lexsort((-cosines, self._owner))
+        rank = np.arange(len(order)) - self._first[self._owner]  # of each among those of its RApp
+        sums = np.bincount(self._owner, np.where(rank < most, cosines[order], 0.0), len(self.names))
+        means: NDArray[np.float64] = sums / np.minimum(self._counts, most)
+        return means
+
+
+def match(texts: Texts, offered: Offered, meanings: Meanings, config: InterpreterConfig) -> Interpretation:
     """The RApp that was meant; None when nothing was heard, there is no RApp, the confidence is too low, or several fit."""
     heard = [(plain(text), chance) for text, chance in texts if plain(text)]
-    offered = {name: list(sentences) for name, sentences in commands.items() if any(map(plain, sentences))}
     best_text = heard[0][0] if heard else ""
-    if not heard or not offered:
-        return Interpretation(None, 0.0, best_text, tuple((name, 0.0) for name in sorted(commands)))
-    nearness = _nearness(heard, offered, meaning, config)
-    ranked = sorted(nearness, key=lambda name: (-nearness[name], name))
-    candidates = [(name, _confidence(nearness, name, config)) for name in ranked]
-    candidates += [(name, 0.0) for name in sorted(commands.keys() - offered.keys())]
-    best, confidence = candidates[0]
-    good = [name for name, value in candidates if value >= config.threshold]
-    close = [name for name in good if nearness[best] - nearness[name] <= config.close][: config.most_asked]
-    named = best if len(close) == 1 else None
-    return Interpretation(named, confidence, best_text, tuple(candidates), tuple(close) if len(close) > 1 else ())
+    if not heard or not offered.names:
+        nothing = sorted(offered.names + offered.mute)[: config.most_candidates]
+        return Interpretation(None, 0.0, best_text, tuple((name, 0.0) for name in nothing))
+    nearness = offered.nearness(heard, meanings, config)
+    ranked = np.argsort(-nearness, kind="stable")[: config.most_candidates + 1]
+    best = float(nearness[ranked[0]])
+    margin = best - float(nearness[ranked[1]]) if len(ranked) > 1 else 0.0
+    # the regression knows margins of the best only: one behind its rival, or without any, gets no margin
+    values = [_confidence(float(nearness[place]), 0.0 if number else margin, config) for number, place in enumerate(ranked)]
+    names = [offered.names[place] for place in ranked]
+    candidates = [*zip(names, values, strict=True), *((name, 0.0) for name in offered.mute)][: config.most_candidates]
+    good = [(name, place) for name, place, value in zip(names, ranked, values, strict=True) if value >= config.threshold]
+    close = [name for name, place in good if best - nearness[place] <= config.close][: config.most_asked]
+    named = names[0] if len(close) == 1 else None
+    return Interpretation(named, values[0], best_text, tuple(candidates), tuple(close) if len(close) > 1 else ())
 
 
 def chances(worths: Sequence[float]) -> list[float]:
@@ -48,27 +83,6 @@ def chances(worths: Sequence[float]) -> list[float]:
     return [part / sum(parts) for part in parts]
 
 
-def _nearness(heard: Texts, offered: dict[str, list[str]], meaning: Meaning, config: InterpreterConfig) -> dict[str, float]:
-    rare = RareWords(offered)
-    meant = [(meaning(text), rare.vector(text), chance) for text, chance in heard]
-    result = {}
-    for name, sentences in offered.items():
-        senses = np.stack([meaning(text) for text in sentences])
-        words = np.stack([rare.vector(text) for text in sentences])
-        result[name] = sum(
-            chance * (_mean_of_best(senses @ sense, config) + config.word_weight * float((words @ word).max()))
-            for sense, word, chance in meant
-        )
-    return result
-
-
-def _mean_of_best(cosines: NDArray[Any], config: InterpreterConfig) -> float:
-    return float(np.sort(cosines)[::-1][: config.sentences_compared].mean())
-
-
-def _confidence(nearness: dict[str, float], name: str, config: InterpreterConfig) -> float:
-    rivals = [value for other, value in nearness.items() if other != name]
-    # the regression knows margins of the best only: one behind its rival, or without any, gets no margin
-    margin = max(0.0, nearness[name] - max(rivals, default=nearness[name]))
-    evidence = config.nearness_weight * nearness[name] + config.margin_weight * margin + config.offset
+def _confidence(nearness: float, margin: float, config: InterpreterConfig) -> float:
+    evidence = config.nearness_weight * nearness + config.margin_weight * margin + config.offset
     return 1.0 / (1.0 + math.exp(-evidence))

@@ -6,7 +6,9 @@ vocabulary `wordpiece.txt` beside this module is that of BERT uncased (Apache-2.
 
 import hashlib
 import unicodedata
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +16,17 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from rapp_cloud.interpreter.errors import Bug
+from rapp_cloud.interpreter.kept import WIDTH, KeptVectors
 from rapp_cloud.interpreter.words import plain
 
 _SHA256 = "8199be6f699a395f99f89df973f9dc5285fbcfcdb2ae1a4e1201dab014f3d2a6"
+MODEL = _SHA256[:16]
+"""Name of the model that vectors are of."""
 _MOST_PIECES = 128
-_KEPT = 4096
-"""Texts whose vectors are remembered: the catalogue's sentences, again and again."""
+_AT_ONCE = 32
+"""Texts of the same number of pieces that go through the model together, in a third of the time; the vectors are the same."""
 
-Vector = NDArray[np.float32]
+Vectors = NDArray[np.float32]
 
 
 def weights_file() -> Path:
@@ -66,28 +71,50 @@ class WordPieces:
 class SentenceModel:
     """Holds the loaded model; one per process, one thread."""
 
-    def __init__(self, weights: Path, vocabulary: Path) -> None:
+    def __init__(self, weights: Path, vocabulary: Path, kept: KeptVectors | None = None) -> None:
+        """Load the model.
+
+        :param kept: where vectors of catalogues' sentences are kept; None: in memory
+        """
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
         options.log_severity_level = 3
         self._model = onnxruntime.InferenceSession(str(weights), options, providers=["CPUExecutionProvider"])
         self._pieces = WordPieces(vocabulary)
-        self._known: dict[str, Vector] = {}
+        self._kept = kept or KeptVectors(None)
 
-    def vector(self, text: str) -> Vector:
-        """The meaning of a text as a vector of length 1: nearness of two is their product, -1..1."""
-        text = plain(text)
-        if text not in self._known:
-            if len(self._known) >= _KEPT:
-                self._known.clear()
-            self._known[text] = self._embed(text)
-        return self._known[text]
+    def vectors(self, texts: Sequence[str]) -> Vectors:
+        """The meanings of texts that are met for once, as rows of length 1: nearness of two is their product, -1..1."""
+        found = np.empty((len(texts), WIDTH), np.float32)
+        for places, vectors in self._embedded([plain(text) for text in texts]):
+            found[places] = vectors
+        return found
 
-    def _embed(self, text: str) -> Vector:
-        row = np.array([self._pieces.numbers(text)], dtype=np.int64)
-        feed = {"input_ids": row, "attention_mask": np.ones_like(row), "token_type_ids": np.zeros_like(row)}
+    def learnt(self, texts: Sequence[str]) -> Vectors:
+        """The same of texts that are met again and again: each is worked out once."""
+        self.learn(texts)
+        return self._kept.take([plain(text) for text in texts])
+
+    def learn(self, texts: Sequence[str]) -> None:
+        """Work out what `learnt` needs."""
+        missing = self._kept.missing([plain(text) for text in texts])
+        for places, vectors in self._embedded(missing):
+            self._kept.add([missing[place] for place in places], vectors)
+
+    def _embedded(self, texts: Sequence[str]) -> Iterator[tuple[list[int], Vectors]]:
+        numbers = [self._pieces.numbers(text) for text in texts]
+        order = sorted(range(len(texts)), key=lambda place: len(numbers[place]))
+        for _, alike in groupby(order, key=lambda place: len(numbers[place])):
+            every = list(alike)
+            for first in range(0, len(every), _AT_ONCE):
+                places = every[first : first + _AT_ONCE]
+                yield places, self._embed([numbers[place] for place in places])
+
+    def _embed(self, numbers: list[list[int]]) -> Vectors:
+        rows = np.array(numbers, dtype=np.int64)
+        feed = {"input_ids": rows, "attention_mask": np.ones_like(rows), "token_type_ids": np.zeros_like(rows)}
         states: NDArray[np.float32] = self._model.run(None, feed)[0]
-        mean = states[0].mean(axis=0)
-        vector: Vector = mean / np.linalg.norm(mean)
-        return vector
+        mean = states.mean(axis=1)
+        vectors: Vectors = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+        return vectors

@@ -20,7 +20,7 @@ class Interpretation:
     text: str
     """The words that were heard, lower case; "" when nothing was."""
     candidates: tuple[tuple[str, float], ...]
-    """(RApp, confidence 0..1), best first, every RApp of the catalogue once."""
+    """(RApp, confidence 0..1), best first, each RApp once; of a large catalogue only the best."""
     choice: tuple[str, ...] = ()
     """RApps that fit about as well as each other, best first: the person knows which is meant. Empty or at least two."""
 

@@ -7,6 +7,7 @@ likeliest texts, so that what a listener is unsure of (daughter, doctor) stays v
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,8 @@ _PIECES_PER_SECOND = 6.5
 """More than anyone speaks; Moonshine's own bound against texts that repeat themselves."""
 _SAMPLES_PER_FRAME = 384
 """Of what the encoder gives."""
+_WORDS = 100_000
+"""Whose pieces are remembered."""
 _SHORTEST = RATE // 5
 """Samples; a word takes longer, and the encoder needs about a third of it."""
 
@@ -67,6 +70,7 @@ class Recogniser:
         self._encoder = onnxruntime.InferenceSession(str(folder / "encoder_model.ort"), options, providers=providers)
         self._decoder = onnxruntime.InferenceSession(str(folder / "decoder_model_merged.ort"), options, providers=providers)
         self._vocabulary: Vocabulary = read_vocabulary(folder / "tokenizer.bin")
+        self._numbers = lru_cache(maxsize=_WORDS)(self._vocabulary.numbers)
         self._past_names = [
             f"past_key_values.{layer}.{side}.{part}"
             for layer in range(_LAYERS)
@@ -92,7 +96,7 @@ class Recogniser:
 
     def expect(self, words: Iterable[str]) -> Expected:
         """The tree of expected words, each also as a sentence's first word."""
-        return expect(self._vocabulary.numbers(form) for word in words for form in (word, word.capitalize()))
+        return expect(self._numbers(form) for word in words for form in (word, word.capitalize()))
 
     def _encode(self, sound: Sound) -> Floats:
         row = sound[np.newaxis, :].astype(np.float32)

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -18,6 +19,8 @@ FUNCTION_WORDS = frozenset(_FUNCTION_WORDS.split())
 
 _STRANGE_WORD = 1.2
 """Weight of a word that no sentence of the catalogue has: about that of one that three RApps of ten share."""
+_NOTHING = 1e-9
+"""Length of a vector that has none."""
 
 
 def plain(text: str) -> str:
@@ -35,19 +38,30 @@ class RareWords:
     """Sentences as vectors of word weights: ln of how few RApps use a word (inverse document frequency)."""
 
     def __init__(self, commands: Mapping[str, Sequence[str]]) -> None:
-        users: dict[str, int] = {}
-        for sentences in commands.values():
-            for word in {word for text in sentences for word in plain(text).split()}:
-                users[word] = users.get(word, 0) + 1
-        self._weights = {word: math.log((len(commands) + 1) / count) for word, count in users.items()}
+        """Weigh the words of these; their sentences are numbered in order."""
+        spoken = {name: [set(plain(text).split()) for text in sentences] for name, sentences in commands.items()}
+        users = Counter(word for each in spoken.values() for word in set().union(*each))
         self._places = {word: place for place, word in enumerate(sorted(users))}
+        self._weights = np.array([math.log((len(commands) + 1) / users[word]) for word in self._places])
+        rows = [words for each in spoken.values() for words in each]
+        self._count = len(rows)
+        self._rows = np.repeat(np.arange(len(rows)), [len(words) for words in rows])
+        self._columns = np.array([self._places[word] for words in rows for word in words], dtype=np.intp)
+        weights = self._weights[self._columns]
+        lengths = np.sqrt(np.bincount(self._rows, weights**2, self._count))
+        self._values = weights / np.maximum(lengths, _NOTHING)[self._rows]
 
     def vector(self, text: str) -> NDArray[np.float64]:
         """A vector of length 1 (0 for a text without weight); its last place stands for words outside the catalogue."""
         vector = np.zeros(len(self._places) + 1)
         words = plain(text).split()
-        for word in set(words) & self._places.keys():
-            vector[self._places[word]] = self._weights[word]
+        known = [self._places[word] for word in set(words) & self._places.keys()]
+        vector[known] = self._weights[known]
         strange = sum(word not in self._places for word in words)
         vector[-1] = _STRANGE_WORD * math.sqrt(strange)
-        return vector / max(float(np.linalg.norm(vector)), 1e-9)
+        return vector / max(float(np.linalg.norm(vector)), _NOTHING)
+
+    def alike(self, text: str) -> NDArray[np.float64]:
+        """How alike a text is to each sentence, 0..1: the products of their vectors."""
+        shares = self._values * self.vector(text)[self._columns]
+        return np.bincount(self._rows, shares, self._count).astype(np.float64, copy=False)
