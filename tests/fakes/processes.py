@@ -30,3 +30,25 @@ def children(pid: int) -> list[int]:
         if state != "Z" and int(parent) == pid:
             found.append(int(folder.name))
     return sorted(found)
+
+
+def words(pid: int) -> list[str]:
+    """The command line of a process; none of one that has ended."""
+    return _file(pid, "cmdline").decode(errors="replace").split("\0")[:-1]
+
+
+def environment(pid: int) -> bytes:
+    """The environment with which a process was started, see proc(5); none of one that has ended."""
+    return _file(pid, "environ")
+
+
+def _file(pid: int, name: str) -> bytes:
+    try:
+        return Path(f"/proc/{pid}/{name}").read_bytes()
+    except OSError:
+        return b""
+
+
+def descendants(pid: int) -> list[int]:
+    """The running children of a process, theirs, and so on."""
+    return [each for child in children(pid) for each in (child, *descendants(child))]

@@ -1,6 +1,7 @@
 """A platform for a robot: making one, or using one that runs already; what the robot's link is told of it."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -11,6 +12,7 @@ from urllib.parse import urlsplit
 from rapp_cli.errors import CommandError, UsageError
 from rapp_cli.mail_account import MailAccount
 from rapp_cli.paths import STORE
+from rapp_cli.secrecy import CLOUD, confided
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")  # where HTTP without encryption is allowed
 USER = "Maria"  # whom the robot serves
@@ -57,7 +59,7 @@ def check_url(url: str) -> str:
 def make_platform(data: Path, robot: str) -> None:
     """Make keys, a store and the robot's token, unless they are there. Raises CommandError."""
     words = [sys.executable, "-m", "rapp_cloud", "init", "--data", str(data), "--robot", robot]
-    made = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    made = subprocess.run(words, env=confided(os.environ, CLOUD), capture_output=True, text=True, timeout=60, check=False)
     if made.returncode:
         raise CommandError(f"cannot make the platform's keys in {data}: {made.stderr.strip()}")
 

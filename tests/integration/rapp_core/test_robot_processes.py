@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fakes.processes import children, ended
+from fakes.processes import children, ended, environment, words
 
 SCRIPT = Path(__file__).parents[3] / "catkin_ws" / "src" / "rapp_core" / "scripts" / "robot"
 WORDS = ("--microphone", "text", "--voice", "silent", "--no-world")
@@ -20,7 +20,7 @@ READY = 60.0  # s
 def robot(tmp_path):
     process = subprocess.Popen(
         [SCRIPT, "--home", str(tmp_path / "home"), *WORDS],
-        env={**os.environ, "RAPP_CLOUD": "http://127.0.0.1:1"},
+        env={**os.environ, "RAPP_CLOUD": "http://127.0.0.1:1", "RAPP_SMTP_PASSWORD": "of the mail"},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -48,6 +48,7 @@ def test_starts_all_and_leaves_none(robot, tmp_path):
     grandchildren = [pid for child in pids for pid in children(child)]
     assert len(pids) == 5
     assert grandchildren  # the spare's sandbox, at least
+    assert [words(pid)[2] for pid in (*pids, *grandchildren) if b"of the mail" in environment(pid)] == ["rapp_link"]
     robot.send_signal(signal.SIGTERM)
     assert robot.wait(30) == 0
     assert [pid for pid in (*pids, *grandchildren) if not ended(pid)] == []

@@ -44,7 +44,9 @@ def test_words_reach_an_agent_as_they_are(tmp_path: Path) -> None:
     assert shlex.split(found["x"].command) == ["setpriv", "--pdeathsig", "TERM", *words]
 
 
-@pytest.mark.parametrize(("secret", "owner"), [("RAPP_SMTP_PASSWORD", "link"), ("RAPP_CLOUD_PASSPHRASE", "cloud")])
+@pytest.mark.parametrize(
+    ("secret", "owner"), [("RAPP_SMTP_PASSWORD", "link"), ("RAPP_CLOUD_PASSPHRASE", "cloud"), ("RAPP_CLOUD_DATABASE", "cloud")]
+)
 def test_a_secret_reaches_its_agent_alone(tmp_path: Path, secret: str, owner: str) -> None:
     found = programs(tmp_path, agents(HOME, SIMULATED))
     told: Mapping[str, str] = {name: config.environment.get(secret) for name, config in found.items()}

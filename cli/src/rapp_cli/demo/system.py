@@ -12,6 +12,7 @@ from rapp_cli.demo.config import DemoConfig
 from rapp_cli.mail_account import MailAccount
 from rapp_cli.paths import ROBOT_SCRIPTS
 from rapp_cli.processes import Child, Children
+from rapp_cli.secrecy import CLOUD, LINK, confided
 
 ROBOT_NAME = "nao"
 
@@ -44,14 +45,14 @@ async def running_system(config: DemoConfig, rapps: Sequence[Path] | None = None
             words += ["--robot", config.robot]
         if config.silent:
             words += ["--microphone", "text", "--voice", "silent"]
-        env = {**os.environ, **link_environment(cloud, account)}
+        env = {**confided(os.environ, LINK), **link_environment(cloud, account)}
         ready = await children.start(Child("robot", words, env, logs / "robot.log"))
         yield System(children, ready["bridge"], ready["robot"], ready["master"], maildir, logs)
 
 
 async def _mail_server(children: Children, maildir: Path, logs: Path) -> MailAccount:
     words = [sys.executable, "-m", "rapp_cloud.mail", "--port", "0", "--maildir", str(maildir)]
-    ready = await children.start(Child("mail server", words, os.environ, logs / "mail.log"))
+    ready = await children.start(Child("mail server", words, confided(os.environ, "mail"), logs / "mail.log"))
     return MailAccount("127.0.0.1", int(ready["port"]), "", "none", None, f"{ROBOT_NAME}@home.example")
 
 
@@ -63,5 +64,5 @@ async def _cloud(config: DemoConfig, sources: Sequence[Path], children: Children
     write_profile(data, ROBOT_NAME, {config.recipient: config.address, **CONTACTS})
     rapps = [word for folder in sources for word in ("--publish", str(folder))]
     words = [sys.executable, "-m", "rapp_cloud", "--port", "0", "--data", str(data), *rapps]
-    ready = await children.start(Child("cloud", words, os.environ, logs / "cloud.log"))
+    ready = await children.start(Child("cloud", words, confided(os.environ, CLOUD), logs / "cloud.log"))
     return own_cloud(data, int(ready["port"]), ROBOT_NAME)

@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from rapp_cli.cloud import foreign_cloud, link_environment, own_cloud
 from rapp_cli.home.place import Home, Settings
 from rapp_cli.mail_account import MailAccount
-from rapp_cloud.keys import PASSPHRASE
+from rapp_cli.secrecy import CLOUD, LINK
 
 NOT_OURS = ("ROS_NAMESPACE", "ROS_HOSTNAME")  # of the user's own ROS; they would move our names and addresses
 CORE = "core_agent"
-LINK = "link"
-CLOUD = "cloud"
-SECRETS = {"RAPP_SMTP_PASSWORD": LINK, PASSPHRASE: CLOUD}  # variables of the environment, and which agent they are for
 RECORDER = "recorder"
 
 

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from rapp_cli.errors import CommandError
-from rapp_cli.home.agents import SECRETS, Agent
+from rapp_cli.home.agents import Agent
 from rapp_cli.home.place import Home
+from rapp_cli.secrecy import SECRETS
 
 STOP = 8  # s from SIGTERM to SIGKILL for an agent
 CALL_TIMEOUT = STOP + 7.0  # s; the longest call waits for the end of one agent

@@ -10,6 +10,9 @@ from typing import Any
 from rapp_core.robot_processes.child import Child
 from rapp_core.robot_processes.config import RobotConfig
 
+LINK = "link"
+SECRETS = ("RAPP_SMTP_PASSWORD",)  # variables of the environment that only the link is told
+
 _log = logging.getLogger(__name__)
 
 
@@ -42,7 +45,7 @@ class RobotProcesses:
         master.wait_port(self._port, config.ready, self._stop)
         bridge = self._module("rosbridge", "--port", str(config.bridge_port), module="rapp_bridge")
         url = f"ws://127.0.0.1:{bridge.wait_ready(config.ready, self._stop)['port']}"
-        link = self._module("link", "--bridge", url, module="rapp_link")
+        link = self._module(LINK, "--bridge", url, module="rapp_link")
         robot = config.robot or f"tcp://127.0.0.1:{self._ready(sim)['port']}"
         link.wait_ready(config.ready, self._stop)
         words = ["--robot", robot, "--home", str(config.home), "--name", config.name, *config.core]
@@ -57,7 +60,8 @@ class RobotProcesses:
         return self._child(name, sys.executable, "-m", module, *words)
 
     def _child(self, name: str, *words: str) -> Child:
-        child = Child(name, words, self._env, self._config.home / "logs" / f"{name}.log")
+        env = self._env if name == LINK else {key: value for key, value in self._env.items() if key not in SECRETS}
+        child = Child(name, words, env, self._config.home / "logs" / f"{name}.log")
         self._children.append(child)
         _log.info("%s started", name)
         return child
