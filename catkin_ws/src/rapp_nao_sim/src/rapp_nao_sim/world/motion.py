@@ -4,7 +4,7 @@ A change of posture sets joints and torso along a way that always rests on the f
 meanwhile joints that are commanded one by one follow their own tracks.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rapp_nao_sim.world.body import Body
@@ -12,29 +12,28 @@ from rapp_nao_sim.world.change import Change, upright
 from rapp_nao_sim.world.errors import Refused
 from rapp_nao_sim.world.frames import Stance
 from rapp_nao_sim.world.model import BODY, CHAINS
-from rapp_nao_sim.world.moves import Track, check, clip, direct, posture_time, through, twin
+from rapp_nao_sim.world.moves import check, clip, direct, posture_time, through, twin
 from rapp_nao_sim.world.postures import LEAN_TOLERANCE, Posture, family, recognise
 from rapp_nao_sim.world.selfcollision import held
+from rapp_nao_sim.world.tracks import Answer, Tracks
 from rapp_nao_sim.world.walk import Walk, ready
 
 _SETTLE = 0.3  # s of physics after a change, before it is judged
 _CALM = 0.8  # speed of waking up and resting
 _SLIP = 0.01  # rad that a limp joint gives before its gears slip
 Ways = Sequence[Sequence[float]]  # for each joint, its values one after another
-_Answer = Callable[[int, bool], None]
 
 
 class Motion:
     """Commands to the body; `answer(number, reached)` is called when a command that takes time ends."""
 
-    def __init__(self, bullet: Any, body: Body, postures: Mapping[str, Posture], answer: _Answer) -> None:
+    def __init__(self, bullet: Any, body: Body, postures: Mapping[str, Posture], answer: Answer) -> None:
         self._bullet = bullet
         self._body = body
         self._postures = postures
         self._answer = answer
         self._now = 0.0
-        self._tracks: dict[str, Track] = {}
-        self._jobs: dict[int, set[str]] = {}
+        self._tracks = Tracks(answer)
         self._change: Change | None = None
         self._moved = True
         self.walk = Walk(answer)
@@ -78,7 +77,7 @@ class Motion:
         self._spare(names)
         for name, angle in zip(names, angles, strict=True):
             for joint in (name, *twin(name)):
-                self._replace(joint, direct(joint, self._now, self.targets[joint], clip(joint, angle), fraction))
+                self._tracks.lead(joint, direct(joint, self._now, self.targets[joint], clip(joint, angle), fraction))
 
     def move_joints(self, number: int, names: Sequence[str], goals: Ways, times: Ways) -> None:
         """Send joints through angles at times (s from now, rising); answers at the end, false when something stopped them."""
@@ -90,9 +89,9 @@ class Motion:
         joints: set[str] = set()
         for name, way, when in zip(names, goals, times, strict=True):
             for joint in (name, *twin(name)):
-                self._replace(joint, through(self._now, self.targets[joint], [clip(joint, angle) for angle in way], when))
+                self._tracks.lead(joint, through(self._now, self.targets[joint], [clip(joint, angle) for angle in way], when))
                 joints.add(joint)
-        self._jobs[number] = joints
+        self._tracks.expect(number, joints)
 
     def set_posture(self, number: int, name: str, speed: float, release: bool = False) -> None:
         """Take a posture; answers at the end whether it is reached."""
@@ -160,8 +159,7 @@ class Motion:
         """End the movement of joints here."""
         check(names)
         for name in names:
-            if self._tracks.pop(name, None) is not None:
-                self._fail(name)
+            self._tracks.stop(name)
 
     def stop_posture(self) -> None:
         """End a change of posture here."""
@@ -197,7 +195,7 @@ class Motion:
 
     def tasks(self) -> list[tuple[str, int, list[str]]]:
         """What is under way: what it is, the number of the request that waits for its end, the joints it moves."""
-        found = [("angleInterpolation", number, sorted(joints, key=BODY.index)) for number, joints in self._jobs.items()]
+        found = [("angleInterpolation", number, sorted(joints, key=BODY.index)) for number, joints in self._tracks.expected()]
         if self._change is not None:
             found.append(("goToPosture", self._change.number, list(BODY)))
         return [*found, ("move", self.walk.number, CHAINS["Legs"])] if self.walk.active else found
@@ -224,17 +222,14 @@ class Motion:
         return name, family(pitch, roll, self._body.hips())
 
     def _follow(self) -> None:
-        wanted = {name: track.at(self._now) for name, track in self._tracks.items() if self.stiffness[name] > 0}
+        wanted = {name: angle for name, angle in self._tracks.angles(self._now).items() if self.stiffness[name] > 0}
         for side in self.protected:
             arm = wanted.keys() & CHAINS[f"{side}Arm"]
             if arm and self._change is None and held(side, self.targets, self.targets | wanted):
                 wanted = {name: angle for name, angle in wanted.items() if name not in arm}
         self._moved = self._moved or bool(wanted)
         self.targets.update(wanted)
-        for joint, track in list(self._tracks.items()):
-            if self._now >= track.end:
-                del self._tracks[joint]
-                self._arrived(joint)
+        self._tracks.arrive(self._now)
 
     def _slip(self) -> None:
         """Let limp joints give way: dry friction holds them where they are until the load drags them on."""
@@ -247,24 +242,6 @@ class Motion:
             if held != self.targets[name]:
                 self.targets[name] = held
                 self._moved = True
-
-    def _arrived(self, joint: str) -> None:
-        for number, joints in list(self._jobs.items()):
-            joints.discard(joint)
-            if not joints:
-                del self._jobs[number]
-                self._answer(number, True)
-
-    def _replace(self, joint: str, track: Track) -> None:
-        self._fail(joint)
-        self._tracks[joint] = track
-
-    def _fail(self, joint: str) -> None:
-        """Tell who waits for a joint that it will not arrive."""
-        for number, joints in list(self._jobs.items()):
-            if joint in joints:
-                del self._jobs[number]
-                self._answer(number, False)
 
     def _spare(self, names: Sequence[str]) -> None:
         """Refuse joints that the walk needs."""
