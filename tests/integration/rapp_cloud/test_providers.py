@@ -238,7 +238,7 @@ def test_who_may_not(cloud: CloudProcess, someone: Callable[[str], Provider], ca
     rosa = someone("rosa")
     rosa.join(capsys, "rose")
     assert rosa.far(capsys, "publish", rapp(tmp_path, "rose")) == 0, rosa.err
-    before, small, large = files(cloud), tmp_path / "small", tmp_path / "large"
+    small, large = tmp_path / "small", tmp_path / "large"
     small.write_bytes(b"{}")
     with large.open("wb") as file:
         file.truncate(80 * 2**20)

@@ -43,11 +43,6 @@ def maria(shelf: Shelf, tmp_path: Path) -> Publisher:
 
 
 @pytest.fixture
-def noted() -> list[tuple[str, str]]:
-    return []
-
-
-@pytest.fixture
 def robot(shelf: Shelf, tmp_path: Path) -> TrustedStore:
     return TrustedStore(StoreFolder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "robot")
 
