@@ -1,7 +1,6 @@
 """The platform put together: parts made from one config, started, served, ended in reverse order."""
 
 import asyncio
-import functools
 import logging
 import shutil
 import time
@@ -17,7 +16,8 @@ from rapp_cloud.cloud_agents.packages import Packages
 from rapp_cloud.config import CloudConfig
 from rapp_cloud.entrance import entrance
 from rapp_cloud.health import checks_of, health
-from rapp_cloud.interpreter.port import Commands, Interpretation, Interpreter
+from rapp_cloud.interpreter.port import Interpreter
+from rapp_cloud.interpreting import Interpreting
 from rapp_cloud.keys import Passphrase
 from rapp_cloud.memory import Memory, remembering
 from rapp_cloud.metrics import MeasuredServer, Metrics
@@ -34,6 +34,7 @@ from rapp_cloud.shelf import Shelf
 from rapp_cloud.static import store_files
 from rapp_cloud.store_page import store_page
 from rapp_cloud.turnstile import Turnstile
+from rapp_cloud.views import Views
 from rapp_cloud.weblets import weblets
 from rapp_cloud.witness import note_offers, noted
 from rapp_hop.errors import HopError
@@ -49,11 +50,11 @@ def open_shelf(data: Path, passphrase: Passphrase | None = None) -> Shelf:
     return Shelf(data / "tuf", data / "keys", passphrase=passphrase)
 
 
-def load_interpreter() -> Interpreter:
+def load_interpreter(cache: Path) -> Interpreter:
     """Load the interpreter; runs in a worker process, so only there its models and libraries are loaded."""
     from rapp_cloud.interpreter.hearing import make_interpreter
 
-    return make_interpreter()
+    return make_interpreter(cache)
 
 
 @asynccontextmanager
@@ -73,13 +74,14 @@ async def running_cloud(config: CloudConfig) -> AsyncIterator[int]:
 
 @asynccontextmanager
 async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Memory) -> AsyncIterator[int]:
-    workers = Workers(load_interpreter, config.workers)
+    workers = Workers(load_interpreter, config.workers, arguments=(config.data / "cache",))
+    interpreting = Interpreting(workers, config.interpret_timeout)
     doors = Doors(config.data / "agents", config.data / "uploads", memory.accounts.name_of)
     agents = _cloud_agents(config, shelf, robots, doors)
     certificate = Certificate(*config.tls_files) if config.tls_files else None
     metrics = _metrics(robots, agents, certificate)
     checks = checks_of(memory, config.data, shelf.metadata / "timestamp.json", certificate)
-    registry = _registry(config, shelf, workers, robots, agents, memory)
+    registry = _registry(config, shelf, interpreting, robots, agents, memory)
     admit = Turnstile(memory.accounts, memory.quotas, time.monotonic).admit
     server = MeasuredServer(metrics, admit, registry, doors.caller, config.data / "uploads", [
         *entrance(memory.admission, memory.audit),
@@ -95,6 +97,7 @@ async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Me
     keeping += [asyncio.create_task(certificate.keep())] if certificate else []
     try:
         await workers.start()
+        keeping.append(asyncio.create_task(interpreting.keep_learning(shelf.manifests)))
         await agents.open()
         server.listen_unix(doors.platform)
         yield server.listen(config.port, config.address)
@@ -133,25 +136,20 @@ def _metrics(robots: Robots, agents: CloudAgents, certificate: Certificate | Non
 
 
 def _registry(
-    config: CloudConfig, shelf: Shelf, workers: Workers, robots: Robots, agents: CloudAgents, memory: Memory
+    config: CloudConfig, shelf: Shelf, interpreting: Interpreting, robots: Robots, agents: CloudAgents, memory: Memory
 ) -> ServiceRegistry:
-    run = functools.partial(_interpret, workers, config.interpret_timeout)
+    views = Views(shelf.manifests)
     return ServiceRegistry(
         [
-            *presence_services(robots, shelf),
+            *presence_services(robots, views),
             *people_services(memory.people),
             *run_services(memory.reports, memory.audit, memory.accounts),
-            *voice_services(robots, shelf, run),
+            *voice_services(robots, views, interpreting),
             *agent_services(agents, robots),
             *sight_services(),
             *publishing_services(shelf.desk, memory.accounts, memory.audit, config.publisher_quota * 2**20),
         ]
     )
-
-
-async def _interpret(workers: Workers, timeout: float, recording: Path, commands: Commands, language: str) -> Interpretation:
-    found: Interpretation = await workers.run("interpret", recording, commands, language, timeout=timeout)
-    return found
 
 
 async def _keep_fresh(shelf: Shelf, period: float) -> None:

@@ -5,7 +5,7 @@ timestamp name them: whenever the power goes, robots see the old state or the ne
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -27,7 +27,7 @@ Note = Callable[[str, str], object]  # deed and subject, told before anything is
 class Desk:
     """The desk of one store; each call holds the store's lock while it changes something."""
 
-    def __init__(self, ledger: Ledger, targets: Path, limits: Limits, offered: Callable[[], list[Manifest]]) -> None:
+    def __init__(self, ledger: Ledger, targets: Path, limits: Limits, offered: Callable[[], Sequence[Manifest]]) -> None:
         """Remember the parts.
 
         :param targets: folder of the packages

@@ -7,7 +7,7 @@ beside the server. Blocking. Who signs what: `ledger`, `custody`, `keys`.
 import hashlib
 import io
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -46,6 +46,15 @@ class Offer:
     yanked: bool = False
 
 
+@dataclass(frozen=True)
+class _Seen:
+    """What was on offer."""
+
+    state: tuple[int, int]  # of the timestamp's file
+    offers: list[Offer]
+    manifests: tuple[Manifest, ...]
+
+
 class Shelf:
     """The store's packages; make it once with `create`, then open it."""
 
@@ -68,7 +77,7 @@ class Shelf:
         self._ledger = Ledger(self.metadata, self._keys, expiry)
         self._limits = limits or Limits()
         self._manifests: dict[str, Manifest] = {}  # by hash and path: a package never changes
-        self._seen: tuple[tuple[int, int], list[Offer]] | None = None  # state of the timestamp's file, and what was on offer
+        self._seen: _Seen | None = None
         self.custody = Custody(self._ledger)
         self.desk = Desk(self._ledger, self.targets, self._limits, self.manifests)
 
@@ -175,24 +184,26 @@ class Shelf:
                     _log.warning("%s: its list runs out", error)
             self._ledger.write(lists, due)
 
-    def manifests(self) -> list[Manifest]:
-        """Return the manifests of all packages on offer; each package is read once.
+    def manifests(self) -> tuple[Manifest, ...]:
+        """Return the manifests of all packages on offer; each package is read once. The same tuple until something changes.
 
         :raises Bug: when a package is gone or was changed behind our back
         """
-        return [offer.manifest for offer in self.offers()]
+        return self._look().manifests
 
     def offers(self, *, yanked: bool = False) -> list[Offer]:
         """Return all packages on offer, and those taken off it when wanted; see `manifests`."""
-        state = self._state()
-        if not yanked and self._seen is not None and self._seen[0] == state:
-            return list(self._seen[1])
-        lists = self._ledger.read()
-        found = [*self._offers(lists), *(self._yanked(lists) if yanked else ())]
-        found.sort(key=lambda offer: (offer.manifest.name, offer.manifest.version.key))
         if not yanked:
-            self._seen = (state, list(found))
-        return found
+            return list(self._look().offers)
+        lists = self._ledger.read()
+        return _sorted([*self._offers(lists), *self._yanked(lists)])
+
+    def _look(self) -> "_Seen":
+        state, seen = self._state(), self._seen
+        if seen is None or seen.state != state:
+            offers = _sorted(self._offers(self._ledger.read()))
+            seen = self._seen = _Seen(state, offers, tuple(offer.manifest for offer in offers))
+        return seen
 
     def _state(self) -> tuple[int, int]:
         """What changes with every change of the store, by whichever process."""
@@ -253,12 +264,12 @@ class Shelf:
 
     def _renew_root(self, lists: Lists) -> None:
         try:
-            signer = self._ledger.signer(lists, "root")
+            signers = self._ledger.root_signers(lists)
         except Refused as error:
             _log.warning("%s: it runs out at %s", error, lists.root.expires)
             return
         lists.root.version += 1
-        self._ledger.write_root(lists.root, [signer])
+        self._ledger.write_root(lists.root, signers)
 
 
 def _desk(lists: Lists, name: str, publisher: str | None) -> tuple[str, Targets, list[str]]:
@@ -273,6 +284,10 @@ def _desk(lists: Lists, name: str, publisher: str | None) -> tuple[str, Targets,
         role = delegated(lists)[publisher]
         role.paths = [*(role.paths or ()), pattern(name)]
     return publisher, lists.publishers[publisher], [] if owner else ["targets"]
+
+
+def _sorted(offers: Iterable[Offer]) -> list[Offer]:
+    return sorted(offers, key=lambda offer: (offer.manifest.name, offer.manifest.version.key))
 
 
 def _known(own: Targets, path: str) -> str | None:

@@ -1,6 +1,6 @@
 """One worker process, as `workers` starts it: `python -m rapp_hop.worker FD`, an inherited end of a socket pair.
 
-First comes (import path, module, function): the function makes the object. Then come (method, arguments), and
+First comes (import path, module, function, its arguments): the function makes the object. Then come (method, arguments), and
 (true, result) or (false, exception) go back, until the other end is gone.
 """
 
@@ -16,13 +16,13 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends its workers
     pipe = Connection(int(sys.argv[1]))
     try:
-        path, module, function = pipe.recv()
+        path, module, function, arguments = pipe.recv()
         sys.path[:] = path
-        subject = getattr(importlib.import_module(module), function)()
+        subject = getattr(importlib.import_module(module), function)(*arguments)
         while True:
-            method, arguments = pipe.recv()
+            method, given = pipe.recv()
             try:
-                answer = (True, getattr(subject, method)(*arguments))
+                answer = (True, getattr(subject, method)(*given))
             except Exception as error:  # noqa: BLE001 (carried to the caller, who knows its type)
                 answer = (False, error)
             _send(pipe, answer)

@@ -24,14 +24,16 @@ _log = logging.getLogger(__name__)
 class Workers:
     """Worker processes; start with `start()`, end with `close()`."""
 
-    def __init__(self, setup: Callable[[], object], count: int, first: int | None = None) -> None:
+    def __init__(self, setup: Callable[..., object], count: int, first: int | None = None, arguments: tuple[Any, ...] = ()) -> None:
         """Remember what to start.
 
         :param setup: a function of an importable module that makes the object whose methods are called
         :param count: processes at most
         :param first: how many of them start at once, all when None; the others when no free one is left
+        :param arguments: of `setup`
         """
         self._setup = setup
+        self._arguments = arguments
         self._count = count
         self._first = count if first is None else min(first, count)
         self._starting: set[asyncio.Task[None]] = set()
@@ -104,7 +106,7 @@ class Workers:
         await asyncio.shield(task)
 
     async def _begin(self) -> None:
-        worker = await asyncio.to_thread(_Worker, self._setup)
+        worker = await asyncio.to_thread(_Worker, self._setup, self._arguments)
         self._all.add(worker)
         self._free.put_nowait(worker)
 
@@ -112,7 +114,7 @@ class Workers:
 class _Worker:
     """One process and the pipe to it."""
 
-    def __init__(self, setup: Callable[[], object]) -> None:
+    def __init__(self, setup: Callable[..., object], arguments: tuple[Any, ...]) -> None:
         near, far = socket.socketpair()
         with far:
             words = [sys.executable, "-m", "rapp_hop.worker", str(far.fileno())]
@@ -121,7 +123,7 @@ class _Worker:
                 words, pass_fds=[far.fileno()], stdin=subprocess.DEVNULL, stdout=2, start_new_session=True
             )
         self._pipe = Connection(near.detach())
-        self._pipe.send((sys.path, setup.__module__, setup.__qualname__))
+        self._pipe.send((sys.path, setup.__module__, setup.__qualname__, arguments))
 
     def call(self, method: str, arguments: tuple[Any, ...]) -> tuple[bool, Any]:
         self._pipe.send((method, arguments))

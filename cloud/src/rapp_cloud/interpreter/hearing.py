@@ -28,9 +28,10 @@ class HearingInterpreter:
         self._offered: Offered | None = None
         self._expected = Expected()
 
-    def learn(self, sentences: Sequence[str]) -> None:
-        """Work out what takes long, before a recording is interpreted against these sentences."""
-        self._sentences.learn(sentences)
+    def learn(self, sentences: Sequence[str], language: str = "en") -> None:
+        """Work out what takes long, before a recording is interpreted against these sentences (see `Interpreter.learn`)."""
+        if language in LANGUAGES:
+            self._sentences.learn(sentences)
 
     def interpret(self, recording: Path, commands: Commands, language: str = "en") -> Interpretation:
         """Say which RApp a recorded sentence asks for (see `Interpreter.interpret`)."""

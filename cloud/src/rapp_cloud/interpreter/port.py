@@ -34,3 +34,7 @@ class Interpreter(Protocol):
         Raises Invalid (no such recording, not sound, too long), Refused (a language that is not offered).
         """
         ...
+
+    def learn(self, sentences: Sequence[str], language: str = "en") -> None:
+        """Work out what takes long, before a recording is interpreted against these; nothing in a language not offered."""
+        ...

@@ -2,16 +2,16 @@
 
 from typing import Any
 
-from rapp_cloud.catalogue import RobotKind, catalogue
+from rapp_cloud.catalogue import RobotKind
 from rapp_cloud.robots import Robots
 from rapp_cloud.services import robot_of
-from rapp_cloud.shelf import Shelf
+from rapp_cloud.views import Views
 from rapp_hop.hz.semver import check_api
 from rapp_hop.hz.text import check_name
 from rapp_hop.service import Request, Service, service
 
 
-def presence_services(robots: Robots, shelf: Shelf) -> list[Service]:
+def presence_services(robots: Robots, views: Views) -> list[Service]:
     """Make the services."""
 
     @service
@@ -30,6 +30,6 @@ def presence_services(robots: Robots, shelf: Shelf) -> list[Service]:
     def list_rapps(request: Request, robot: str | None = None) -> dict[str, Any]:
         """List the RApps of the store, compatible ones and others with the reasons."""
         kind = robots.kind_of(robot_of(request, robot))
-        return {"rapps": [entry.describe() for entry in catalogue(shelf.manifests(), kind)]}
+        return {"rapps": views.described(kind)}
 
     return [register, heartbeat, list_rapps]
