@@ -12,7 +12,7 @@ from securesystemslib.signer import Key
 from tuf.api.metadata import DelegatedRole, Delegations, Targets  # type: ignore[attr-defined]
 
 from rapp_cloud.judge import judge
-from rapp_cloud.keys import ROLES
+from rapp_cloud.keys import ROLES, ROOTS
 from rapp_cloud.ledger import Ledger, Lists
 from rapp_hop.errors import Refused
 from rapp_hop.hz.application import Application
@@ -29,8 +29,9 @@ class Holder:
     name: str
     keys: tuple[str, ...]  # key ids; none: revoked
     expires: datetime | None
-    here: bool  # whether the private key is in the folder
+    here: bool  # whether as many private keys as must sign are in the folder
     packages: tuple[str, ...] = ()
+    threshold: int = 1  # keys that must sign
 
 
 class Custody:
@@ -43,7 +44,10 @@ class Custody:
         """Return all roles and publishers, revoked ones last."""
         lists, here = self._ledger.read(), set(self._ledger.keys.names())
         expiries = {name: getattr(lists, name).expires for name in ROLES}
-        found = [Holder(name, tuple(lists.root.roles[name].keyids), expiries[name], name in here) for name in ROLES]
+        root = lists.root.roles["root"]
+        signs = len(here & set(ROOTS[: len(root.keyids)])) >= root.threshold
+        found = [Holder("root", tuple(root.keyids), expiries["root"], signs, (), root.threshold)]
+        found += [Holder(name, tuple(lists.root.roles[name].keyids), expiries[name], name in here) for name in ROLES[1:]]
         for name, role in sorted(delegated(lists).items()):
             names = tuple(package_of(path) for path in role.paths or ())
             found.append(Holder(name, tuple(role.keyids), lists.publishers[name].expires, name in here, names))
@@ -62,7 +66,8 @@ class Custody:
         """
         with self._ledger.locked():
             lists = self._ledger.read()
-            if check_name(publisher) in ROLES or publisher in delegated(lists) or publisher.startswith("next_"):
+            taken = {*ROLES, *ROOTS, *delegated(lists)}
+            if check_name(publisher) in taken or publisher.startswith("next_"):
                 raise Refused(f"cannot make the publisher {publisher}: the name is taken")
             if application is not None:
                 self._ledger.write(lists, ["targets"], admit(self._ledger, lists, application))
@@ -90,7 +95,7 @@ class Custody:
     def rotate(self, name: str, application: Application | None = None) -> None:
         """Give a role or publisher a new key; the old one is worth nothing from then on.
 
-        A new root is signed by the old key too, so that robots follow.
+        A new root is signed by the old keys too, so that robots follow; all its keys are new.
 
         :param application: of a publisher who has made the new key at home, and signed the list that is on offer with it
         :raises Refused: when there is no such role or publisher, or a key that must sign is not here
@@ -102,6 +107,8 @@ class Custody:
                 self._ledger.keys.remove(name)
             elif application is not None:
                 raise Refused(f"cannot put another key in the place of {name}'s: that is no publisher, see ./rapp keys list")
+            elif name == "root":
+                self._rotate_root(lists, len(lists.root.roles["root"].keyids), lists.root.roles["root"].threshold)
             elif name in ROLES:
                 self._rotate_role(lists, name)
             elif name in delegated(lists):
@@ -109,6 +116,19 @@ class Custody:
                 self._rotate_publisher(lists, name)
             else:
                 raise Refused(f"cannot rotate the key of {name}: it has none, see ./rapp keys list")
+
+    def share_root(self, keys: int, threshold: int) -> None:
+        """Give the root so many new keys, some of which must sign from then on: one lost or stolen does not end the store.
+
+        :raises Refused: when the numbers make no sense, a publisher has a key's name, or a key that must sign is not here
+        """
+        if not 1 <= threshold <= keys <= len(ROOTS):
+            raise Refused(f"cannot have {threshold} of {keys} keys sign: give 1 to {len(ROOTS)} keys, and at most all of them")
+        with self._ledger.locked():
+            lists = self._ledger.read()
+            if taken := sorted({*ROOTS[:keys]} & {*lists.publishers}):
+                raise Refused(f"cannot make the key {taken[0]}: a publisher has that name, have fewer keys")
+            self._rotate_root(lists, keys, threshold)
 
     def revoke(self, publisher: str) -> None:
         """Take a publisher's right to sign away: nothing they have signed is on offer any more.
@@ -134,16 +154,31 @@ class Custody:
             self._ledger.keys.remove(publisher)
 
     def _rotate_role(self, lists: Lists, name: str) -> None:
-        old, root = self._ledger.signer(lists, "root"), lists.root
+        signers, root = self._ledger.root_signers(lists), lists.root
         new = self._ledger.prepare(lists, name)
         for keyid in list(root.roles[name].keyids):
             root.revoke_key(keyid, name)
         root.add_key(new.public_key, name)
         root.version += 1
-        self._ledger.write_root(root, [old, new] if name == "root" else [old])
+        self._ledger.write_root(root, signers)
         self._ledger.settle(name)
-        if name != "root":
-            self._ledger.write(lists, () if name == "timestamp" else [name])
+        self._ledger.write(lists, () if name == "timestamp" else [name])
+
+    def _rotate_root(self, lists: Lists, keys: int, threshold: int) -> None:
+        old, root = self._ledger.root_signers(lists), lists.root
+        new = [self._ledger.prepare(lists, name) for name in ROOTS[:keys]]
+        for keyid in list(root.roles["root"].keyids):
+            root.revoke_key(keyid, "root")
+        for signer in new:
+            root.add_key(signer.public_key, "root")
+        root.roles["root"].threshold = threshold
+        root.version += 1
+        self._ledger.write_root(root, [*old, *new])
+        for name in ROOTS[:keys]:
+            self._ledger.settle(name)
+        for name in ROOTS[keys:]:
+            if name not in lists.publishers:
+                self._ledger.drop(name)
 
     def _rotate_publisher(self, lists: Lists, name: str) -> None:
         new = self._ledger.prepare(lists, name)

@@ -27,6 +27,7 @@ from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.text import check_name
 
 ROLES = ("root", "targets", "snapshot", "timestamp")
+ROOTS = ("root", *(f"root_{number}" for number in range(2, 10)))  # the root may have several keys
 PASSPHRASE, PASSPHRASE_FILE = "RAPP_CLOUD_PASSPHRASE", "RAPP_CLOUD_PASSPHRASE_FILE"
 _SHORTEST = 16  # characters of a passphrase: PKCS 8 makes guessing hardly slower
 _LONGEST = 1024  # bytes

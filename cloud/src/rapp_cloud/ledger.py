@@ -18,7 +18,7 @@ from tuf.api.metadata import Metadata, MetaFile, Root, Snapshot, Targets, Timest
 from tuf.api.serialization import DeserializationError
 
 from rapp_cloud.files import write_whole
-from rapp_cloud.keys import ROLES, KeyRing
+from rapp_cloud.keys import ROLES, ROOTS, KeyRing
 from rapp_hop.errors import Refused
 from rapp_hop.hz.lock import held
 from rapp_hop.hz.trust import SIGNED_AT
@@ -111,7 +111,7 @@ class Ledger:
         now = datetime.now(UTC).replace(microsecond=0)
         lists.timestamp.unrecognized_fields[SIGNED_AT] = now.isoformat()
         self._sign(lists, "timestamp", lists.timestamp, self.expiry.timestamp)
-        for name in (*ROLES, *lists.publishers):
+        for name in (*ROLES, *ROOTS[1:], *lists.publishers):
             self._settle_believed(lists, name)
 
     def write_root(self, root: Root, signers: Iterable[CryptoSigner]) -> None:
@@ -145,6 +145,19 @@ class Ledger:
             raise Refused(f"cannot sign as {name}: {name}.pem is not in {self.keys.folder}, {next_step}")
         raise Refused(f"cannot sign as {name}: its key in {self.keys.folder} is not the one that robots believe")
 
+    def root_signers(self, lists: Lists) -> list[CryptoSigner]:
+        """Return the root's keys that are here, be they prepared ones.
+
+        :raises Refused: when they are fewer than must sign
+        """
+        role = lists.root.roles["root"]
+        found = [self.keys.signer(name) for root in ROOTS for name in (root, _NEXT + root) if self.keys.has(name)]
+        here = {signer.public_key.keyid: signer for signer in found if signer.public_key.keyid in role.keyids}
+        if len(here) < role.threshold:
+            which = f"{len(here)} of the {len(role.keyids)} keys that robots believe in {self.keys.folder}"
+            raise Refused(f"cannot sign as root: there are {which}, {role.threshold} must sign; bring another there")
+        return list(here.values())
+
     def prepare(self, lists: Lists, name: str) -> CryptoSigner:
         """Make the key that is to follow and keep it beside the present one, so that none is lost whenever the power is."""
         self._settle_believed(lists, name)
@@ -155,6 +168,11 @@ class Ledger:
     def settle(self, name: str) -> None:
         """Put the prepared key in its place: what is on the disk names it by now."""
         self.keys.keep(name, self.keys.signer(_NEXT + name))
+        self.keys.remove(_NEXT + name)
+
+    def drop(self, name: str) -> None:
+        """Throw away a key, and one that was to follow it."""
+        self.keys.remove(name)
         self.keys.remove(_NEXT + name)
 
     @contextmanager
@@ -199,6 +217,8 @@ class Ledger:
 
 
 def _keyids(lists: Lists, name: str) -> list[str]:
+    if name in ROOTS and name not in lists.publishers:
+        return list(lists.root.roles["root"].keyids)
     if name in ROLES:
         return list(lists.root.roles[name].keyids)
     delegations = lists.targets.delegations

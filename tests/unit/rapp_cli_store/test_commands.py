@@ -154,6 +154,14 @@ def test_keys_from_the_terminal(desk: Desk) -> None:
     assert not re.search(r"PRIVATE|passphrase", before + after)
 
 
+def test_several_root_keys_from_the_terminal(desk: Desk) -> None:
+    told = desk.does("keys", "root", "--keys", "3", "--threshold", "2")
+    assert "2 must sign: root.pem, root_2.pem, root_3.pem" in told
+    assert re.search(r"(?m)^root .* key here, 2 of 3 sign ", desk.does("keys", "list"))
+    assert desk.does("keys", "rotate", "root") == "root has a new key\n"
+    assert "cannot have 3 of 2 keys sign" in desk.refuses("keys", "root", "--keys", "2", "--threshold", "3")
+
+
 def test_packages_as_files(desk: Desk, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = source_folder(tmp_path)
     for output in ("a.hz", "b.hz"):

@@ -1,6 +1,7 @@
 """Keys: made, encrypted, rotated, revoked; publishers keep their names; robots follow or refuse."""
 
 import shutil
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -97,21 +98,16 @@ def test_rotation_is_followed_by_robots_old_and_new(shelf: Shelf, robot: Trusted
     assert not (tmp_path / "keys" / f"next_{role}.pem").exists()
     shelf._keys.keep(role, old)  # a thief has the old key
     with pytest.raises(Refused, match="not the one that robots believe"):
-        shelf.custody.rotate(role) if role == "root" else shelf._ledger.signer(shelf._ledger.read(), role)
+        shelf._ledger.signer(shelf._ledger.read(), role)
 
 
 @pytest.mark.parametrize("role", [*ROLES, "rapp"])
 def test_a_rotation_cut_short_loses_no_key(shelf: Shelf, robot: TrustedStore, tmp_path: Path, role: str) -> None:
     """Power goes after each write of a rotation; the store goes on."""
-    state = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    before = Kept(tmp_path)
     for writes in range(8):
-        for folder in ("tuf", "keys", "trust"):
-            shutil.rmtree(tmp_path / folder, ignore_errors=True)
-        for path, data in state.items():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
-            path.chmod(0o600)
-        cut_after(writes, shelf, role)
+        before.again()
+        cut_after(writes, lambda: shelf.custody.rotate(role))
         shelf.refresh()
         shelf.publish(package(tmp_path, version="1.1.0"))
         assert offered(robot) == ["1.0.0", "1.1.0"], f"after {writes} writes"
@@ -119,11 +115,27 @@ def test_a_rotation_cut_short_loses_no_key(shelf: Shelf, robot: TrustedStore, tm
         assert offered(robot) == ["1.0.0", "1.1.0"]
 
 
+class Kept:
+    """All files below a folder as they are now."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._files = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+    def again(self) -> None:
+        for folder in ("tuf", "keys", "trust"):
+            shutil.rmtree(self._folder / folder, ignore_errors=True)
+        for path, data in self._files.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+            path.chmod(0o600)
+
+
 class PowerGone(BaseException):
     """Nothing happens after this."""
 
 
-def cut_after(writes: int, shelf: Shelf, role: str) -> None:
+def cut_after(writes: int, change: Callable[[], None]) -> None:
     left = [writes]
 
     def limited(original):  # type: ignore[no-untyped-def]
@@ -139,9 +151,76 @@ def cut_after(writes: int, shelf: Shelf, role: str) -> None:
         for module in ("ledger", "keys"):
             patch.setattr(f"rapp_cloud.{module}.write_whole", limited(write_whole))
         try:
-            shelf.custody.rotate(role)
+            change()
         except PowerGone:
             return
+
+
+def test_a_root_of_three_keys_outlives_one_of_them(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
+    assert offered(robot) == ["1.0.0"]
+    shelf.custody.share_root(3, 2)
+    (root, *_) = shelf.custody.holders()
+    assert (len(root.keys), root.threshold, root.here) == (3, 2, True)
+    (tmp_path / "keys" / "root_2.pem").unlink()  # lost
+    for role in ("targets", "root"):
+        shelf.custody.rotate(role)
+        shelf.publish(package(tmp_path, version=f"1.0.{len(role)}"))
+    assert offered(robot) == ["1.0.0", "1.0.4", "1.0.7"]
+    assert len(set(shelf.custody.holders()[0].keys) - set(root.keys)) == 3
+    shelf.custody.share_root(1, 1)
+    assert not list((tmp_path / "keys").glob("root_*.pem"))
+    newcomer = TrustedStore(StoreFolder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "new")
+    assert offered(newcomer) == offered(robot)
+
+
+def test_one_of_three_root_keys_changes_nothing(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
+    shelf.custody.share_root(3, 2)
+    assert offered(robot) == ["1.0.0"]
+    before = Kept(tmp_path)
+    thief = shelf._keys.signer("root_3")
+    for name in ("root", "root_2"):
+        (tmp_path / "keys" / f"{name}.pem").unlink()
+    assert not shelf.custody.holders()[0].here
+    for change in (
+        lambda: shelf.custody.rotate("root"),
+        lambda: shelf.custody.rotate("targets"),
+        lambda: shelf.custody.share_root(1, 1),
+    ):
+        with pytest.raises(Refused, match=r"1 of the 3 keys that robots believe .*, 2 must sign"):
+            change()
+    shelf.refresh()  # what needs no root goes on
+    shelf.publish(package(tmp_path, version="1.1.0"))
+    assert offered(robot) == ["1.0.0", "1.1.0"]
+    before.again()
+    root, own = shelf._ledger.read().root, shelf._keys.new("root")
+    for keyid in list(root.roles["root"].keyids):
+        root.revoke_key(keyid, "root")
+    root.add_key(own.public_key, "root")
+    root.roles["root"].threshold = 1
+    root.version += 1
+    shelf._ledger.write_root(root, [thief, own])
+    with pytest.raises(Untrusted) as refused:
+        offered(robot)
+    assert refused.value.attack is Attack.UNSIGNED
+
+
+def test_a_root_shared_out_while_the_power_goes_loses_no_key(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
+    before = Kept(tmp_path)
+    for writes in range(9):
+        before.again()
+        cut_after(writes, lambda: shelf.custody.share_root(3, 2))
+        shelf.refresh()
+        shelf.publish(package(tmp_path, version="1.1.0"))
+        shelf.custody.rotate("root")
+        assert offered(robot) == ["1.0.0", "1.1.0"], f"after {writes} writes"
+
+
+@pytest.mark.parametrize(("keys", "threshold"), [(3, 4), (3, 0), (0, 0), (10, 2)])
+def test_numbers_of_root_keys_that_make_no_sense(shelf: Shelf, keys: int, threshold: int) -> None:
+    with pytest.raises(Refused, match=f"cannot have {threshold} of {keys} keys sign"):
+        shelf.custody.share_root(keys, threshold)
+    with pytest.raises(Refused, match="the name is taken"):
+        shelf.custody.add("root_2")
 
 
 def test_a_publisher_of_their_own(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:

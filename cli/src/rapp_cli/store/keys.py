@@ -1,11 +1,12 @@
-"""`./rapp keys list|new|grant|rotate|revoke`: who may sign for what in a store; `own`: a publisher's own key, at home."""
+"""`./rapp keys list|new|grant|rotate|root|revoke`: who may sign for what in a store; `own`: a publisher's own key, at home."""
 
 import argparse
 from pathlib import Path
 
 from rapp_cli.errors import UsageError
 from rapp_cli.store.own_key import add_own_options, make_own
-from rapp_cli.store.place import add_store_options, store_of, told
+from rapp_cli.store.place import add_store_options, keys_of, store_of, told
+from rapp_cloud.keys import ROOTS
 from rapp_hop.hz.application import Application, read_application
 
 _DONE = {"new": "may publish", "grant": "has the names", "rotate": "has a new key", "revoke": "has no key any more"}
@@ -21,6 +22,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     listing = actions.add_parser("list", help="show roles and publishers, their keys, and until when their word is good")
     new = actions.add_parser("new", help="make a publisher, or give one whose key was revoked another")
     rotate = actions.add_parser("rotate", help="give a role (root, targets, snapshot, timestamp) or publisher a new key")
+    root = actions.add_parser("root", help="have several keys sign the root: one lost or stolen does not end the store")
+    root.add_argument("--keys", type=int, default=3, help="how many (%(default)s); all are made anew")
+    root.add_argument("--threshold", type=int, default=2, help="how many of them must sign (%(default)s)")
     revoke = actions.add_parser("revoke", help="take a publisher's key away, and all it has signed off offer")
     grant = actions.add_parser("grant", help="give names of RApps to a publisher, for good")
     own = actions.add_parser(
@@ -31,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     grant.add_argument("rapp", nargs="+")
     for action in (new, rotate):
         action.add_argument("--public", type=Path, metavar="FILE", help="of a publisher who has made it with ./rapp keys own")
-    for action in (listing, new, rotate, revoke, grant):
+    for action in (listing, new, rotate, root, revoke, grant):
         add_store_options(action)
     add_own_options(own)
 
@@ -46,7 +50,14 @@ def run(options: argparse.Namespace) -> int:
         for holder in custody.holders():
             until = f"{holder.expires:%F %R}" if holder.expires else "revoked"
             here = "key here" if holder.here else "key elsewhere" if holder.keys else ""
+            here += f", {holder.threshold} of {len(holder.keys)} sign" if len(holder.keys) > 1 else ""
             print(f"{holder.name:<12} {until:<16} {here:<13} {' '.join(holder.keys)}  {', '.join(holder.packages)}".rstrip())
+        return 0
+    if options.action == "root":
+        custody.share_root(options.keys, options.threshold)
+        names = ", ".join(f"{name}.pem" for name in ROOTS[: options.keys])
+        print(f"root has {options.keys} keys in {keys_of(options).folder}, {options.threshold} must sign: {names}")
+        print("rapp keys: keep them apart, where no one thief and no one fire reaches as many as must sign")
         return 0
     if options.action in ("new", "rotate"):
         (custody.add if options.action == "new" else custody.rotate)(options.name, _application(options))
