@@ -11,7 +11,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rapp_cloud.tls import WARNING, expiry, server_tls
+from rapp_cloud.tls import WARNING, server_tls, validity
 from rapp_hop.errors import HopError, Invalid
 
 LOOK = 1.0  # seconds between two looks at the files
@@ -34,7 +34,7 @@ class Certificate:
         self._taken = self._seen = _state(self._files)
         self._reminded: float | None = None
         self.context = server_tls(certificate, key)
-        self.until = expiry(certificate)  # UTC, seconds since 1970
+        self.until = validity(certificate)[1]  # UTC, seconds since 1970
         self._shown = self.context
         # Called in each handshake, whether the client names a server or not: so the one shown can change at any time.
         self.context.sni_callback = self._show
@@ -65,9 +65,9 @@ class Certificate:
 
     def _renew(self) -> None:
         try:
-            context, until = server_tls(*self._files), expiry(self._files[0])
-            if until <= self._clock():
-                raise Invalid(f"cannot use {self._files[0]}: it has expired already, put one there that is good")
+            context, (since, until) = server_tls(*self._files), validity(self._files[0])
+            if not since <= self._clock() < until:
+                raise Invalid(f"cannot use {self._files[0]}: it has expired or is not good yet, put one there that is good now")
         except HopError as error:
             _log.error("%s; meanwhile the certificate of before stays, good until %s", error, self.end)
             return

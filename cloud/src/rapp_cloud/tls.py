@@ -58,13 +58,14 @@ def make_certificate(folder: Path, hosts: Sequence[str]) -> Path:
     return folder / CERTIFICATE
 
 
-def expiry(certificate: Path) -> float:
-    """Return until when a certificate is good, in seconds since 1970 (UTC).
+def validity(certificate: Path) -> tuple[float, float]:
+    """Return since when and until when a certificate is good, in seconds since 1970 (UTC).
 
     :raises Refused: when it cannot be read
     :raises Invalid: when it is none
     """
-    return _read(certificate).not_valid_after_utc.timestamp()
+    found = _read(certificate)
+    return found.not_valid_before_utc.timestamp(), found.not_valid_after_utc.timestamp()
 
 
 def may_be_made_anew(certificate: Path) -> bool:

@@ -192,11 +192,12 @@ def test_o03_new_files_are_taken_when_they_lie_still(
     assert len(caplog.records) == 1
 
 
-@pytest.mark.parametrize("how", ["half", "no key for it", "open key", "gone", "expired", "nonsense"])
+@pytest.mark.parametrize("how", ["half", "no key for it", "open key", "gone", "expired", "not yet", "nonsense"])
 def test_o03_what_is_wrong_with_new_files_is_said_once_and_mended(
     shown: Certificate, files: Files, authority: Authority, caplog: pytest.LogCaptureFixture, how: str
 ) -> None:
-    certificate, key = authority.issue(BEGIN + datetime.timedelta(milliseconds=1) if how == "expired" else LATER)
+    begin, end = MIDNIGHT if how == "not yet" else BEGIN, BEGIN if how == "expired" else LATER
+    certificate, key = authority.issue(end, begin)
     files.put({"half": (certificate[:200], key), "no key for it": (certificate, authority.issue()[1]),
                "nonsense": (b"nonsense", key)}.get(how, (certificate, key)))  # fmt: skip
     if how == "open key":
