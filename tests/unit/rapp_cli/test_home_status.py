@@ -1,5 +1,6 @@
 """What `status` puts together."""
 
+import argparse
 import json
 from pathlib import Path
 from typing import Any
@@ -7,11 +8,14 @@ from typing import Any
 import pytest
 
 from fakes.rapps import install_rapp
-from rapp_cli.home import platform, status
+from rapp_cli.errors import CommandError
+from rapp_cli.home import platform, retry, status
 from rapp_cli.home.place import Home, Settings
 from rapp_cli.home.status import State, Status
 from rapp_cli.home.supervisor import Process
 from rapp_cli.timeline import Entry, append
+from rapp_core.config import Config
+from rapp_core.control.quarantine import Quarantine
 from rapp_link.letter import Letter, to_json
 
 NOW = 1_800_000_000.0
@@ -114,3 +118,17 @@ def test_people_are_told_what_runs_since_when_and_why_not(home: Home) -> None:
     assert "RApp        hazard\ncloud agent hazard_cloud" in four
     assert "installed   hazard 1.2.0\n" in four
     assert "./rapp up" in status.text(home, Status([], None, None, None, 0), NOW)
+
+
+@pytest.mark.usefixtures("silent")
+def test_a_rapp_in_quarantine_is_shown_until_it_is_to_be_tried_again(home: Home, capsys: pytest.CaptureFixture[str]) -> None:
+    for _ in range(3):
+        Quarantine(Config(home=home.robot)).failed("clock", "1.0.0", "ValueError: on purpose")
+    shown = status.text(home, status.read(home, {}), NOW)
+    assert "quarantine  clock 1.0.0 until " in shown
+    assert "has failed 3 times in a row (ValueError: on purpose)" in shown
+    words = argparse.Namespace(rapp="clock", home=home.folder)
+    assert retry.run(words) == 0
+    assert status.read(home, {}).quarantine == {}
+    with pytest.raises(CommandError, match="has not failed"):
+        retry.run(words)

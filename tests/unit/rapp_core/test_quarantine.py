@@ -65,6 +65,15 @@ def test_it_says_until_when(home: Home) -> None:
     assert home.refusal() == "clock keeps failing, I will not start it before tomorrow 00:02"
 
 
+def test_those_in_quarantine_are_listed(home: Home) -> None:
+    home.fail(2)
+    assert home.quarantine.present() == {}
+    home.fail()
+    assert [(name, entry.failures) for name, entry in home.quarantine.present().items()] == [("clock", 3)]
+    home.now += 60
+    assert home.quarantine.present() == {}
+
+
 def test_another_rapp_and_another_version_are_free(home: Home) -> None:
     home.fail(3)
     assert home.quarantine.refusal("parrot", "1.0.0") is None
@@ -75,7 +84,7 @@ def test_another_rapp_and_another_version_are_free(home: Home) -> None:
 
 def test_a_success_ends_it_and_the_count(home: Home) -> None:
     home.fail(3)
-    home.quarantine.succeeded("clock")
+    assert [home.quarantine.forget("clock") for _ in range(2)] == [True, False]
     assert home.refusal() is None
     home.fail(2)
     assert home.refusal() is None

@@ -13,6 +13,9 @@ from rapp_cli.home.agents import CORE, RECORDER
 from rapp_cli.home.place import Home, add_home_option, home_of
 from rapp_cli.home.supervisor import Process, Supervisor, process_state
 from rapp_cli.timeline import Entry, latest
+from rapp_core.config import Config
+from rapp_core.control.quarantine import Entry as Failing
+from rapp_core.control.quarantine import Quarantine
 from rapp_hop.errors import Invalid
 from rapp_hop.hz.install import RappFolder
 from rapp_link.letter import from_json
@@ -42,6 +45,7 @@ class Status:
     mails_waiting: int
     installed: Mapping[str, str] = field(default_factory=dict)  # versions of the RApps on the robot
     cloud_agent: str | None = None  # name of its package, when the running RApp has one at the home's own platform
+    quarantine: Mapping[str, Failing] = field(default_factory=dict)  # RApps that keep failing, and are not started for a while
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +74,8 @@ def read(home: Home, processes: Mapping[str, Process]) -> Status:
     registered = asyncio.run(platform.registered(home.settled().bridge, PATIENCE)) if processes else None
     rapp, agent = (_rapp(folder) if running else None for folder in (home.robot / "runs", home.cloud / "agents" / "runs"))
     installed = {name: manifest.version.text for name, manifest in RappFolder(home.robot / "rapps").list().items()}
-    return Status(agents, core, rapp, registered, _waiting(home.robot), installed, agent)
+    failing = Quarantine(Config(home=home.robot)).present()
+    return Status(agents, core, rapp, registered, _waiting(home.robot), installed, agent, failing)
 
 
 def _frozen(process: Process) -> Process:
@@ -125,6 +130,9 @@ def text(home: Home, status: Status, now: float) -> str:
         standing = {True: "registered", False: "not registered: it is away", None: "not known: the link does not answer"}
         lines += [f"platform    {standing[status.registered]}"]
     lines += [f"installed   {', '.join(f'{name} {version}' for name, version in status.installed.items()) or 'no RApp'}"]
+    for name, entry in status.quarantine.items():
+        until = time.strftime("%H:%M:%S", time.localtime(entry.until))
+        lines += [f"quarantine  {name} {entry.version} until {until}: has failed {entry.failures} times in a row ({entry.why})"]
     return "\n".join([*lines, f"mails       {status.mails_waiting} waiting to be sent"])
 
 

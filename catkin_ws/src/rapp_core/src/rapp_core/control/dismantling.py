@@ -57,7 +57,7 @@ class Dismantling:
         if trial.why and not stopped:
             self._quarantine.failed(trial.name, trial.version, trial.why)
         elif run is not None and run.outcome is not None and run.outcome[:1] == ("done",):
-            self._quarantine.succeeded(trial.name)
+            self._quarantine.forget(trial.name)
         return trial.end(run.name if run else "", bool(run and run.first_word.is_set()))
 
     def _stop_cloud_agent(self, run: Agent) -> None:

@@ -1,7 +1,7 @@
 """Versions of RApps that fail again and again: started again after a while only, each time a longer one.
 
 Kept on disk, and read at each question, so that neither the core agent's end nor the robot's ends a quarantine. What ends it: a
-success, another version, or the end of its time, after which the next failure brings a longer one.
+success, another version, `./rapp retry`, or the end of its time, after which the next failure brings a longer one.
 """
 
 import json
@@ -37,12 +37,17 @@ class Quarantine:
         self._config = config
         self._wall = wall
 
+    def present(self) -> dict[str, Entry]:
+        """Those not to be started now, by name; a clock that went back shows nothing, so it ends a quarantine."""
+        now = self._wall()
+        return {name: entry for name, entry in self._entries().items() if entry.since <= now < entry.until}
+
     def refusal(self, name: str, version: str) -> str | None:
         """What to say of a version that is not to be started now; None when it may be."""
-        entry, now = self._entries().get(name), self._wall()
-        if entry is None or entry.version != version or not entry.since <= now < entry.until:
-            return None  # a clock that went back shows nothing, so it ends the quarantine
-        return f"{name.replace('_', ' ')} keeps failing, I will not start it before {_spoken(entry.until, now)}"
+        entry = self.present().get(name)
+        if entry is None or entry.version != version:
+            return None
+        return f"{name.replace('_', ' ')} keeps failing, I will not start it before {_spoken(entry.until, self._wall())}"
 
     def failed(self, name: str, version: str, why: str) -> None:
         """It has failed, and nobody else is to blame."""
@@ -56,11 +61,13 @@ class Quarantine:
         if seconds:
             _log.warning("%s %s has failed %d times: not started for %.0f s", name, version, failures, seconds)
 
-    def succeeded(self, name: str) -> None:
-        """It has come to its end."""
+    def forget(self, name: str) -> bool:
+        """It has come to its end, or somebody has seen to it; gives whether there was anything to forget."""
         entries = self._entries()
-        if entries.pop(name, None) is not None:
+        known = entries.pop(name, None) is not None
+        if known:
             self._write(entries)
+        return known
 
     def _entries(self) -> dict[str, Entry]:
         try:
