@@ -1,7 +1,5 @@
 """Keys: made, encrypted, rotated, revoked; publishers keep their names; robots follow or refuse."""
 
-import shutil
-from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -9,14 +7,12 @@ import pytest
 from securesystemslib.signer import CryptoSigner
 from tuf.api.metadata import Metadata, MetaFile, Root, Snapshot, TargetFile, Targets, Timestamp
 
-from fakes.packages import source_folder
-from fakes.store_folder import StoreFolder
-from rapp_cloud.files import write_whole
+from fakes.power import Kept, cut_after
+from fakes.small_store import offered, package, robot_of, shelf_with_hello
 from rapp_cloud.keys import ROLES, KeyRing, Passphrase, passphrase_from
 from rapp_cloud.ledger import Expiry
 from rapp_cloud.shelf import Shelf
 from rapp_hop.errors import Invalid, Refused
-from rapp_hop.hz.archive import build
 from rapp_hop.hz.trust import Attack, TrustedStore, Untrusted, choose
 
 SECRET = "correct horse battery staple"
@@ -24,25 +20,12 @@ SECRET = "correct horse battery staple"
 
 @pytest.fixture
 def shelf(tmp_path: Path) -> Shelf:
-    shelf = Shelf(tmp_path / "tuf", tmp_path / "keys")
-    shelf.create()
-    shelf.publish(package(tmp_path))
-    return shelf
+    return shelf_with_hello(tmp_path)
 
 
 @pytest.fixture
 def robot(shelf: Shelf, tmp_path: Path) -> TrustedStore:
-    return TrustedStore(StoreFolder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "trust")
-
-
-def package(folder: Path, name: str = "hello", version: str = "1.0.0", program: str = "pass\n") -> bytes:
-    source = folder / "sources" / program.strip()
-    shutil.rmtree(source, ignore_errors=True)
-    return build(source_folder(source, name, version, program))
-
-
-def offered(robot: TrustedStore, name: str = "hello") -> list[str]:
-    return [release.version.text for release in robot.versions(name).releases]
+    return robot_of(shelf, tmp_path, "trust")
 
 
 def key_of(shelf: Shelf, name: str) -> str:
@@ -93,7 +76,7 @@ def test_rotation_is_followed_by_robots_old_and_new(shelf: Shelf, robot: Trusted
     assert {name for name in after if after[name] != before[name]} == {role}
     shelf.publish(package(tmp_path, version="1.1.0"))
     assert offered(robot) == ["1.0.0", "1.1.0"]
-    newcomer = TrustedStore(StoreFolder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "new")
+    newcomer = robot_of(shelf, tmp_path, "new")
     assert offered(newcomer) == ["1.0.0", "1.1.0"]
     assert not (tmp_path / "keys" / f"next_{role}.pem").exists()
     shelf._keys.keep(role, old)  # a thief has the old key
@@ -113,114 +96,6 @@ def test_a_rotation_cut_short_loses_no_key(shelf: Shelf, robot: TrustedStore, tm
         assert offered(robot) == ["1.0.0", "1.1.0"], f"after {writes} writes"
         shelf.custody.rotate(role)
         assert offered(robot) == ["1.0.0", "1.1.0"]
-
-
-class Kept:
-    """All files below a folder as they are now."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._files = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-    def again(self) -> None:
-        for folder in ("tuf", "keys", "trust"):
-            shutil.rmtree(self._folder / folder, ignore_errors=True)
-        for path, data in self._files.items():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
-            path.chmod(0o600)
-
-
-class PowerGone(BaseException):
-    """Nothing happens after this."""
-
-
-def cut_after(writes: int, change: Callable[[], None]) -> None:
-    left = [writes]
-
-    def limited(original):  # type: ignore[no-untyped-def]
-        def write(*args, **kwargs):  # type: ignore[no-untyped-def]
-            if not left[0]:
-                raise PowerGone
-            left[0] -= 1
-            original(*args, **kwargs)
-
-        return write
-
-    with pytest.MonkeyPatch.context() as patch:
-        for module in ("ledger", "keys"):
-            patch.setattr(f"rapp_cloud.{module}.write_whole", limited(write_whole))
-        try:
-            change()
-        except PowerGone:
-            return
-
-
-def test_a_root_of_three_keys_outlives_one_of_them(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
-    assert offered(robot) == ["1.0.0"]
-    shelf.custody.share_root(3, 2)
-    (root, *_) = shelf.custody.holders()
-    assert (len(root.keys), root.threshold, root.here) == (3, 2, True)
-    (tmp_path / "keys" / "root_2.pem").unlink()  # lost
-    for role in ("targets", "root"):
-        shelf.custody.rotate(role)
-        shelf.publish(package(tmp_path, version=f"1.0.{len(role)}"))
-    assert offered(robot) == ["1.0.0", "1.0.4", "1.0.7"]
-    assert len(set(shelf.custody.holders()[0].keys) - set(root.keys)) == 3
-    shelf.custody.share_root(1, 1)
-    assert not list((tmp_path / "keys").glob("root_*.pem"))
-    newcomer = TrustedStore(StoreFolder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "new")
-    assert offered(newcomer) == offered(robot)
-
-
-def test_one_of_three_root_keys_changes_nothing(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
-    shelf.custody.share_root(3, 2)
-    assert offered(robot) == ["1.0.0"]
-    before = Kept(tmp_path)
-    thief = shelf._keys.signer("root_3")
-    for name in ("root", "root_2"):
-        (tmp_path / "keys" / f"{name}.pem").unlink()
-    assert not shelf.custody.holders()[0].here
-    for change in (
-        lambda: shelf.custody.rotate("root"),
-        lambda: shelf.custody.rotate("targets"),
-        lambda: shelf.custody.share_root(1, 1),
-    ):
-        with pytest.raises(Refused, match=r"1 of the 3 keys that robots believe .*, 2 must sign"):
-            change()
-    shelf.refresh()  # what needs no root goes on
-    shelf.publish(package(tmp_path, version="1.1.0"))
-    assert offered(robot) == ["1.0.0", "1.1.0"]
-    before.again()
-    root, own = shelf._ledger.read().root, shelf._keys.new("root")
-    for keyid in list(root.roles["root"].keyids):
-        root.revoke_key(keyid, "root")
-    root.add_key(own.public_key, "root")
-    root.roles["root"].threshold = 1
-    root.version += 1
-    shelf._ledger.write_root(root, [thief, own])
-    with pytest.raises(Untrusted) as refused:
-        offered(robot)
-    assert refused.value.attack is Attack.UNSIGNED
-
-
-def test_a_root_shared_out_while_the_power_goes_loses_no_key(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
-    before = Kept(tmp_path)
-    for writes in range(9):
-        before.again()
-        cut_after(writes, lambda: shelf.custody.share_root(3, 2))
-        shelf.refresh()
-        shelf.publish(package(tmp_path, version="1.1.0"))
-        shelf.custody.rotate("root")
-        assert offered(robot) == ["1.0.0", "1.1.0"], f"after {writes} writes"
-
-
-@pytest.mark.parametrize(("keys", "threshold"), [(3, 4), (3, 0), (0, 0), (10, 2)])
-def test_numbers_of_root_keys_that_make_no_sense(shelf: Shelf, keys: int, threshold: int) -> None:
-    with pytest.raises(Refused, match=f"cannot have {threshold} of {keys} keys sign"):
-        shelf.custody.share_root(keys, threshold)
-    with pytest.raises(Refused, match="the name is taken"):
-        shelf.custody.add("root_2")
 
 
 def test_a_publisher_of_their_own(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
@@ -310,7 +185,7 @@ def test_a_store_of_an_earlier_version_is_adopted(tmp_path: Path) -> None:
     data = package(tmp_path)
     earlier_store(tmp_path, data)
     shelf = Shelf(tmp_path / "tuf", tmp_path / "keys")
-    robot = TrustedStore(StoreFolder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "trust")
+    robot = robot_of(shelf, tmp_path, "trust")
     assert offered(robot) == ["1.0.0"]
     assert [manifest.name for manifest in shelf.manifests()] == ["hello"]
     for _ in range(2):
