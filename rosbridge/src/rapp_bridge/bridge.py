@@ -1,8 +1,10 @@
 """The bridge put together: ROS on one side, clients on the other."""
 
 import asyncio
+import logging
 import socket
 import ssl
+from collections.abc import Sequence
 from typing import Any
 
 import rosgraph
@@ -13,6 +15,7 @@ from rapp_bridge.blocking import Blocking
 from rapp_bridge.calls import Calls
 from rapp_bridge.config import Config
 from rapp_bridge.doorway import Doorway
+from rapp_bridge.errors import Invalid
 from rapp_bridge.graph import Graph
 from rapp_bridge.local import Locals
 from rapp_bridge.master import Master
@@ -22,6 +25,7 @@ from rapp_bridge.presence import Presence
 from rapp_bridge.publications import Publications
 from rapp_bridge.ros import Ros
 from rapp_bridge.rosapi import Rosapi
+from rapp_bridge.rostypes import service_class
 from rapp_bridge.server import Hall
 from rapp_bridge.subscriptions import Subscriptions
 from rapp_bridge.websocket import GOING_AWAY
@@ -29,6 +33,8 @@ from rapp_ros.rejoin import Rejoining
 
 SWEEP = 1.0  # s between looks for what has grown old
 CLIENT_BACKLOG = 1024  # clients that may connect at once
+
+_log = logging.getLogger(__name__)
 
 
 class Bridge:
@@ -59,6 +65,7 @@ class Bridge:
         if not config.guest:
             await self._rosapi.offer(self._own)
             await self._presence.begin(self._hall)
+        await self._load(config.service_types)
         self._server = await self._listen(tls)
         port: int = self._server.sockets[0].getsockname()[1]
         if not config.guest:
@@ -66,6 +73,13 @@ class Bridge:
             self._rejoining = Rejoining()
         self._sweeping = asyncio.create_task(self._sweep())
         return port
+
+    async def _load(self, types: Sequence[str]) -> None:
+        for name in types:
+            try:
+                await self._blocking.run(service_class, name)
+            except Invalid as error:
+                _log.warning("%s", error)  # a call says so too
 
     async def _listen(self, tls: ssl.SSLContext | None) -> asyncio.Server:
         config = self._config

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from fakes.bridge_neighbours import Clients, Peer
+from rapp_ros.master import ask
 
 STARTER = Path(__file__).parents[3] / "catkin_ws/src/rapp_core/scripts/rosbridge"
 
@@ -32,6 +33,23 @@ def test_it_ends_cleanly_with_calls_open_both_ways(start: Any, peer: Peer, numbe
             assert (await peer.heard()).startswith("error")
 
     asyncio.run(story())
+
+
+def test_a_guest_serves_its_clients_and_offers_nothing_of_its_own(start: Any, peer: Peer, ros_env: dict[str, str]) -> None:
+    types = ["--service-type", "rapp_msgs/Say", "--service-type", "rapp_msgs/NotThere"]
+    bridge = start("rapp_bridge", "--port", "0", "--guest", *types, env={"ROS_NAMESPACE": "/guest"})
+
+    async def story() -> None:
+        async with Clients(f"ws://127.0.0.1:{bridge.ready['port']}") as clients:
+            socket = await clients.new()
+            await socket.send(op="call_service", service="/say", args={"text": "hello"})
+            assert (await socket.receive("service_response"))["values"]["message"] == "hello"
+
+    asyncio.run(story())
+    publishers, subscribers, services = ask(ros_env["ROS_MASTER_URI"], 10.0, "getSystemState", "/test")[2]
+    assert [topic for topic, nodes in [*publishers, *subscribers] if "/guest/rosbridge" in nodes] == []
+    offered = {name for name, nodes in services if "/guest/rosbridge" in nodes}
+    assert offered == {"/guest/rosbridge/get_loggers", "/guest/rosbridge/set_logger_level"}
 
 
 def test_it_ends_while_it_waits_for_a_master(ros_env: dict[str, str]) -> None:

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from fakes.processes import ended
+from fakes.rapps import install_rapp
 from fakes.roslibjs import install_roslib
 from rapp_ros.master import ask
 
@@ -175,6 +176,34 @@ def test_an_es_module_is_a_rapp_too(workshop):
     assert (outcome, "module" in text) == ("done", True), text
 
 
+def test_a_robot_that_has_such_rapps_keeps_node_warm_and_other_rapps_do_not_meet_it(workshop, wait_for):
+    def warm() -> Any:
+        workshop.launcher.prepare()
+        spare = workshop.launcher._spare
+        assert spare.wait_ready(20)
+        return spare, [pid for pid in inside_of(spare) if {b"rapp_bridge", b"runner.js"} & words_of(pid)]
+
+    install_rapp(workshop.config.home, "before", "", runtime="javascript")
+    spare, engine = warm()
+    assert len(engine) == 2
+    assert workshop.start("console.log('warm');", runtime="javascript") is spare
+    assert not any(ended(pid) for pid in engine)
+    assert workshop.finish(spare)[1] == "done"
+    spare, engine = warm()
+    os.kill(engine[0], signal.SIGKILL)
+    wait_for(lambda: ended(engine[0]))
+    text, outcome = workshop.finish(workshop.start("console.log('started anew');", runtime="javascript"))
+    assert outcome == "done", text
+    spare, engine = warm()
+    assert workshop.start("self.pause(60)") is spare
+    assert all(ended(pid) for pid in engine)
+
+
+def words_of(pid: int) -> set[bytes]:
+    """The words that started a process, without their folders."""
+    return {word.rpartition(b"/")[2] for word in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")}
+
+
 # ends that are none
 
 
@@ -212,7 +241,7 @@ while (failed === null) {
 console.log("FACTS", failed.name, failed.message);
 """
     run = workshop.start(body, runtime="javascript")
-    victim = next(pid for pid in inside_of(run) if b"rapp_bridge" in Path(f"/proc/{pid}/cmdline").read_bytes())
+    victim = next(pid for pid in inside_of(run) if b"rapp_bridge" in words_of(pid))
     os.kill(victim, signal.SIGKILL)
     text, outcome = workshop.finish(run)
     assert outcome == "done", text

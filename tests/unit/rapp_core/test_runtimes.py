@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from fakes.rapps import write_rapp
+from fakes.rapps import install_rapp, write_rapp
 from rapp_core.errors import NO_RUNTIME, Invalid, Refused
-from rapp_core.launcher.runtimes import check_runtime
+from rapp_core.launcher.runtimes import check_runtime, runtime_at_hand
 from rapp_core.manifest import read_manifest
 
 
@@ -42,3 +42,12 @@ def test_a_language_that_is_not_known_is_invalid(package: Path) -> None:
     (package / "package.json").write_text(json.dumps(whole))
     with pytest.raises(Invalid, match="cobol"):
         read_manifest(package)
+
+
+def test_a_spare_has_node_at_hand_on_a_robot_with_such_rapps_only(tmp_path: Path) -> None:
+    assert runtime_at_hand(tmp_path) == ""
+    install_rapp(tmp_path, "other")
+    (tmp_path / "rapps" / "broken" / "current").mkdir(parents=True)
+    assert runtime_at_hand(tmp_path) == ""
+    install_rapp(tmp_path, "probe", "", runtime="javascript")
+    assert runtime_at_hand(tmp_path) == "javascript"

@@ -24,6 +24,7 @@ RUNNER = "/rapp/node_modules/rapp_api/runner.js"  # inside the sandbox
 PORT = 9090  # of rosbridge, where every client looks for it
 LONGEST_CALL = 3600  # s; longer than any service takes
 LARGEST_FRAME = 32 << 20  # bytes; the files of one call, as text
+ANY_SERVICE = "rapp_msgs/Say"  # loads those of its package with it
 BACKLOG = 16
 LEAVING = 1.0  # s for node to end once its end of the channel is closed
 PASSED_ON: Mapping[str, tuple[str, ...]] = {
@@ -34,13 +35,55 @@ PASSED_ON: Mapping[str, tuple[str, ...]] = {
 """What node's side tells the core agent, and the texts in it."""
 
 
-def live(channel: Channel, order: dict[str, Any], lost: Callable[[], None], bounds: Bounds) -> int:
+class Engine:
+    """rosbridge and node, idle until they are told what to be; whoever connects before rosbridge is there waits at its listener."""
+
+    def __init__(self) -> None:
+        """Start both."""
+        with socket.create_server(("127.0.0.1", PORT), backlog=BACKLOG) as listener:
+            words = ["--guest", "--listener", str(listener.fileno())]
+            words += ["--call-timeout", str(LONGEST_CALL), "--frame-limit", str(LARGEST_FRAME), "--service-type", ANY_SERVICE]
+            self._bridge = subprocess.Popen([sys.executable, "-m", "rapp_bridge", *words], pass_fds=[listener.fileno()])
+        ours, theirs = socket.socketpair()
+        with theirs:
+            environment = {**os.environ, "NODE_PATH": LIBRARIES, "RAPP_CHANNEL_FD": str(theirs.fileno())}
+            self._program = subprocess.Popen([NODE, RUNNER], pass_fds=[theirs.fileno()], env=environment)
+        self.channel = SocketChannel(ours, lambda: None)
+        """To node's side."""
+
+    @property
+    def alive(self) -> bool:
+        """Whether both run."""
+        return self._bridge.poll() is None and self._program.poll() is None
+
+    def end(self) -> None:
+        """End and reap both."""
+        for process in (self._bridge, self._program):
+            process.kill()
+            process.wait()
+
+    def death(self) -> int:
+        """The exit status, never 0, of a program that has closed its channel, or broken it."""
+        with suppress(subprocess.TimeoutExpired):
+            self._program.wait(LEAVING)
+        if self._program.poll() is None:
+            self._program.kill()
+        status = self._program.wait()
+        return status if status > 0 else 128 - status
+
+
+def warm_up(wanted: str) -> Engine | None:
+    """The engine, started ahead, when `wanted` is this language."""
+    return Engine() if wanted == RUNTIME else None
+
+
+def live(channel: Channel, order: dict[str, Any], lost: Callable[[], None], bounds: Bounds, engine: Engine) -> int:
     """Be the RApp that the "activate" message names; gives 0 once "gone" is said, else the exit status of a program that died.
 
     `lost` is called, in a thread of its own, when the core agent closes the channel before that.
     """
     over, count = threading.Event(), _Count()
-    program, inner = _start()
+    inner = engine.channel
     inner.send(**order, bridge=f"ws://127.0.0.1:{PORT}")
 
     def obey() -> None:
@@ -59,7 +102,7 @@ def live(channel: Channel, order: dict[str, Any], lost: Callable[[], None], boun
     gone = _pass_on(inner, channel, count)
     over.set()
     if not gone:
-        return _death(program)
+        return engine.death()
     channel.send(type="gone")
     return 0
 
@@ -82,26 +125,3 @@ def _pass_on(inner: Channel, channel: Channel, count: _Count) -> bool:
         elif kind in PASSED_ON:
             channel.send(type=kind, **{name: str(message.get(name, ""))[:LONGEST_DETAIL] for name in PASSED_ON[kind]})
     return False
-
-
-def _start() -> tuple["subprocess.Popen[bytes]", SocketChannel]:
-    """Start rosbridge and node; whoever connects before rosbridge is there waits at its listener."""
-    with socket.create_server(("127.0.0.1", PORT), backlog=BACKLOG) as listener:
-        words = ["--guest", "--listener", str(listener.fileno())]
-        words += ["--call-timeout", str(LONGEST_CALL), "--frame-limit", str(LARGEST_FRAME)]
-        subprocess.Popen([sys.executable, "-m", "rapp_bridge", *words], pass_fds=[listener.fileno()])
-    ours, theirs = socket.socketpair()
-    with theirs:
-        environment = {**os.environ, "NODE_PATH": LIBRARIES, "RAPP_CHANNEL_FD": str(theirs.fileno())}
-        program = subprocess.Popen([NODE, RUNNER], pass_fds=[theirs.fileno()], env=environment)
-    return program, SocketChannel(ours, lambda: None)
-
-
-def _death(program: "subprocess.Popen[bytes]") -> int:
-    """The exit status, never 0, of a program that has closed its channel, or broken it."""
-    with suppress(subprocess.TimeoutExpired):
-        program.wait(LEAVING)
-    if program.poll() is None:
-        program.kill()
-    status = program.wait()
-    return status if status > 0 else 128 - status

@@ -35,19 +35,26 @@ def main() -> None:
 def _run(end: socket.socket) -> None:
     channel = SocketChannel(end, _lost)
     hand_over_if_guarded()
+    engine = javascript.warm_up(os.environ.pop("RAPP_WARM", ""))
     rospy.init_node("dynamic_agent", anonymous=True, disable_signals=True, disable_rosout=True)
     logging.basicConfig(level=logging.INFO, format=LOG_FORMAT, stream=sys.stderr, force=True)  # rospy has put in its own
     channel.send(type="ready")
     order = channel.receive()
-    if order is not None and order.get("runtime") == javascript.RUNTIME:
-        status = javascript.live(channel, order, _lost, Bounds())
+    wanted = order is not None and order.get("runtime") == javascript.RUNTIME
+    if engine is not None and not (wanted and engine.alive):
+        engine.end()
+        engine = None
+    if order is None:
+        return
+    if order["type"] != "activate":
+        channel.send(type="gone")
+    elif wanted:
+        status = javascript.live(channel, order, _lost, Bounds(), engine or javascript.Engine())
         if status != 0:
             _exit(status)
-    elif order is not None and order["type"] == "activate":
+    else:
         core_agent.use(RosCoreAgent(order.get("token", "")))
         live(channel, order, _lost, Bounds())
-    elif order is not None:
-        channel.send(type="gone")
 
 
 def _told_to_end(_number: int, _frame: FrameType | None) -> None:

@@ -19,14 +19,13 @@ delete process.env.RAPP_CHANNEL_FD;
 let order = null;
 let agent = null;
 let ended = false;
-let beats = 0;
 
 process.on("uncaughtException", terminate); // a promise that nobody waits for comes here too
-setInterval(() => channel.send({ type: "heartbeat", count: (beats += 1) }), BEAT);
 
 function take(message) {
   if (message.type === "activate") {
     order = message;
+    setInterval(() => channel.send({ type: "heartbeat" }), BEAT);
     be().catch(terminate);
   } else if (message.type === "dismantle") {
     dismantle();

@@ -18,7 +18,7 @@ from rapp_core.launcher.channel import Channel
 from rapp_core.launcher.confined import Confined, adopt_orphans
 from rapp_core.launcher.gate import Gate
 from rapp_core.launcher.run import Run
-from rapp_core.launcher.runtimes import check_runtime
+from rapp_core.launcher.runtimes import check_runtime, runtime_at_hand
 from rapp_core.launcher.sandbox import INSIDE_PRIVATE, RunFolders, command
 from rapp_core.manifest import Manifest, read_manifest
 from rapp_core.ports import Told
@@ -133,6 +133,7 @@ class Launcher:
             "ROS_IP": "127.0.0.1",
             "RAPP_CHANNEL_FD": str(channel),
             "RAPP_GATE_FD": str(gate),
+            "RAPP_WARM": runtime_at_hand(self._config.home),
             "HOME": INSIDE_PRIVATE,
             "TMPDIR": INSIDE_PRIVATE,
             "ROS_HOME": INSIDE_PRIVATE,
