@@ -25,7 +25,7 @@ ENTRY = {
     "lazy": "communication.rapp_say('here')\nself.pause(60)",
     "listener": "communication.rapp_recognize(['yes', 'no'], 60.0)",
     "recorder": "communication.rapp_record(60.0)",
-    "caller": "cloud.call_wait('profile', timeout=60)",
+    "caller": "communication.rapp_say('here')\nself.pause(1)\ncloud.call_wait('profile', timeout=60)",
     "fine": "communication.rapp_say('fine')",
     "breaks": "raise ValueError('on purpose')",
 }
@@ -40,16 +40,18 @@ def rapps(folder: Path) -> list[Path]:
     made.append(write_rapp(folder / "fresh", "fresh", "pass"))
     slow = write_rapp(folder / "slow", "slow", "pass")
     (slow / "agent.py").write_text("import time\ntime.sleep(60)\n" + (slow / "agent.py").read_text())
+    ends = write_rapp(folder / "ends", "ends", "pass")
+    (ends / "agent.py").write_text((ends / "agent.py").read_text() + "\n    def dismantle(self) -> None:\n        self.pause(60)\n")
     made += [write_rapp(folder / name, name, "pass", sentences={"en": [TWINS]}) for name in ("castor", "pollux")]
     body = "cloud.call_agent_wait('quick')\ncommunication.rapp_say('here')\nself.pause(60)"
-    return [*made, slow, *write_four_agent_rapp(folder, "four", body, SERVICE, permissions=PERMISSIONS)]
+    return [*made, slow, ends, *write_four_agent_rapp(folder, "four", body, SERVICE, permissions=PERMISSIONS)]
 
 
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WholeRobot]:
     folder = tmp_path_factory.mktemp("stop")
     robot = WholeRobot(folder / "robot", rapps(folder / "rapps"))
-    robot.settings = "first_word = 60.0\nhang = 120.0\n"
+    robot.settings = "first_word = 60.0\nhang = 120.0\ndismantle = 60.0\nterminate = 0.5\n"
     robot.failures = 3
     with whole_robot(robot, "roscore", "cloud", "nao_sim", "rosbridge", "link", "core_agent"):
         lift_hand(robot)
@@ -151,8 +153,7 @@ def test_l11_s6_a_download_is_given_up(robot: WholeRobot, stop: Stop) -> None:
     assert not (robot.home / "rapps" / "fresh" / "current").exists()
 
 
-@both
-@pytest.mark.parametrize("state", ["s7", "s8"])
+@pytest.mark.parametrize(("state", "stop"), [("s7", by_hand), ("s8", by_hand), ("s8", by_word)])
 def test_l11_s7_s8_a_rapp_that_starts_is_ended(robot: WholeRobot, stop: Stop, state: str) -> None:
     since = len(robot.seen)
     robot.ask("slow")
@@ -183,15 +184,20 @@ def test_l11_s9_a_rapp_that_runs_is_ended_whatever_it_does(
 
 def test_l11_s9_a_rapp_that_waits_for_the_platform_is_ended(robot: WholeRobot) -> None:
     since = len(robot.seen)
-    robot.ask("caller", "s9")
-    robot.until_listening(since)
-    since = len(robot.seen)
+    robot.ask("caller")
+    robot.until(said("here"), since)
     with platform_stands_still(robot):
-        robot.ask("caller")
         begun = robot.until(lambda seen: seen.detail == "core->link call profile", since)
         robot.until(listening_after(by_word(robot, since)), since)
     assert not any(seen.detail == "link->core reply call profile" for seen in robot.seen[robot.seen.index(begun) :])
     robot.until_only_the_spare_runs()
+
+
+@both
+def test_l11_s10_a_rapp_that_takes_its_time_to_end_is_not_waited_for(robot: WholeRobot, stop: Stop) -> None:
+    since = len(robot.seen)
+    robot.ask("ends")
+    assert stop_at(robot, stop, since, entered("s10")) == ["s10", "s11", "s3"]
 
 
 @both

@@ -23,6 +23,7 @@ from rapp_core.control.parts import Parts
 from rapp_core.control.platform import Platform
 from rapp_core.errors import Bug, Invalid, Refused, Unreachable
 from rapp_core.launcher.lease import Lease
+from rapp_core.ports import Signal
 from rapp_core.services.context import Context
 from rapp_core.services.executor import Executor
 from rapp_core.trace import Happening, Trace
@@ -546,6 +547,21 @@ def test_l11_the_person_ends_the_question_which_rapp_is_meant(home: Home, stop: 
     ask_what_fits_two(home, None)
     home.clock.after(2.0, lambda: stop(home))
     assert failing_round(home) == (["s3", "s5", "s12", "s11", "s3"], [QUESTION, STOP_WORDS])
+
+
+def test_l11_a_run_that_is_dismantled_is_not_waited_for(home: Home, monkeypatch: pytest.MonkeyPatch) -> None:
+    hurried: list[bool] = []
+
+    def dismantle(run: FakeAgent, _patience: float, hurry: Signal) -> bool:
+        lay_hand(home)
+        hurried.append(hurry.is_set() and hurry.wait(0.1))
+        return False
+
+    monkeypatch.setattr(FakeAgent, "dismantle", dismantle)
+    home.start()
+    ask(home)
+    assert failing_round(home) == (BROKEN, [STOP_WORDS])
+    assert hurried == [True]
 
 
 def test_l11_while_it_only_listens_the_word_is_none(home: Home) -> None:

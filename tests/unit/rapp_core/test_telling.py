@@ -42,3 +42,12 @@ def test_a_request_its_progress_and_its_end_are_told(
 
 def test_what_is_asked_every_minute_is_not_told() -> None:
     assert told("list_rapps", {}, {"rapps": []}) == []
+
+
+def test_a_request_that_is_given_up_is_told_as_cancelled() -> None:
+    details: list[str] = []
+    trace = Trace()
+    trace.listen(lambda happening: details.append(happening.detail))
+    for name in ("install", "list_rapps"):
+        Telling(trace, name, {"name": "clock"}).cut()
+    assert details == ["core->link cancel install clock (asynchronous)"]

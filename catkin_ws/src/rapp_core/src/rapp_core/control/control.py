@@ -219,6 +219,7 @@ class Control:
         run = self._present()
         self._dismantling.destroy(run)
         self._run = None
+        self._heed_stop(share)
         self._judge(share, run)
 
     def _judge(self, share: Subsystem, run: Agent | None) -> None:
@@ -239,7 +240,6 @@ class Control:
 
     def close(self) -> None:
         """Stop the robot, end a run that still lives, let the robot rest."""
-        self._stopping.end()
         self._dismantling.close(self._run)
         self._run = None
 

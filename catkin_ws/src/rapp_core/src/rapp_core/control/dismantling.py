@@ -1,6 +1,7 @@
 """State s10: ends a run, and all that it has started on the robot and at the platform (DESIGN section 3.5)."""
 
 import logging
+import threading
 
 from rapp_core.body_ports import Movement
 from rapp_core.control.parts import Parts
@@ -28,7 +29,8 @@ class Dismantling:
     def destroy(self, run: Agent) -> None:
         """Dismantle in the order of DESIGN section 3.5, kill, release the lease, warm the next spare.
 
-        The robot is stopped before anything that takes time; a run that has not come to its end by itself is not waited for.
+        The robot is stopped before anything that takes time; a run that has not come to its end by itself, or that the person
+        stops meanwhile, is not waited for.
         """
         parts = self._parts
         if run.outcome is None:
@@ -36,7 +38,10 @@ class Dismantling:
             self.still()
         if run.alive:
             parts.trace.send("core", "dynamic", "dismantle")
-            run.dismantle(parts.config.dismantle if run.outcome is not None else HURRIED, parts.stop)
+            run.dismantle(parts.config.dismantle if run.outcome is not None else HURRIED, _Either(parts.stop, self._stopping))
+        if self._stopping.given():
+            parts.lease.release()
+            self.still()
         self._stop_cloud_agent(run)
         parts.lease.release()
         self.still()
@@ -93,6 +98,7 @@ class Dismantling:
         parts = self._parts
         parts.lease.release()
         reached = self.still()
+        self._stopping.end()
         parts.cloud_agents.forget()
         if run is not None:
             self.end(run)
@@ -114,3 +120,18 @@ class Dismantling:
         """Let what the robot sees and feels for us be idle."""
         self._parts.robot.camera.close()
         self._parts.robot.feeling.close()
+
+
+class _Either:
+    """A `ports.Signal`: the core agent is to end, or the person stops the robot."""
+
+    def __init__(self, stop: threading.Event, stopping: Stopping) -> None:
+        self._stop = stop
+        self._stopping = stopping
+
+    def is_set(self) -> bool:
+        return self._stop.is_set() or self._stopping.given()
+
+    def wait(self, timeout: float) -> bool:
+        self._stop.wait(timeout)
+        return self.is_set()

@@ -1,4 +1,4 @@
-"""How a person stops the robot: a hand on the middle of its head, or a word (`words.STOP`); from s4 to s9 and in s12."""
+"""How a person stops the robot: a hand on the middle of its head, or a word (`words.STOP`); from s4 to s10 and in s12."""
 
 import logging
 import threading
