@@ -11,9 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import BinaryIO
 
-from tuf.api.exceptions import RepositoryError
 from tuf.api.metadata import TargetFile, Targets  # type: ignore[attr-defined]  # public, but not in __all__
 
 from rapp_cloud.custody import Custody, add_publisher, delegated, owner_of
@@ -21,8 +19,9 @@ from rapp_cloud.desk import Desk
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import ROLES, KeyRing, Passphrase
 from rapp_cloud.ledger import Expiry, Ledger, Lists
-from rapp_hop.errors import Bug, Invalid, Refused
-from rapp_hop.hz.archive import Contents, extract, inspect, package_file_name
+from rapp_cloud.packages import PackageFiles
+from rapp_hop.errors import Invalid, Refused
+from rapp_hop.hz.archive import extract, inspect, package_file_name
 from rapp_hop.hz.manifest import Manifest
 from rapp_hop.hz.standing import YANKED, custom_of, pattern
 from rapp_hop.hz.tar import Limits
@@ -68,7 +67,7 @@ class Shelf:
     ) -> None:
         """Remember the places; reads nothing yet.
 
-        :param folder: holds metadata/ and targets/
+        :param folder: holds metadata/ and targets/; beside it is cache/
         :param keys: private folder of the keys
         """
         self.metadata = folder / "metadata"
@@ -76,7 +75,7 @@ class Shelf:
         self._keys = KeyRing(keys, passphrase)
         self._ledger = Ledger(self.metadata, self._keys, expiry)
         self._limits = limits or Limits()
-        self._manifests: dict[str, Manifest] = {}  # by hash and path: a package never changes
+        self._packages = PackageFiles(self.targets, folder.parent / "cache" / "packages.jsonl", self._limits)
         self._seen: _Seen | None = None
         self.custody = Custody(self._ledger)
         self.desk = Desk(self._ledger, self.targets, self._limits, self.manifests)
@@ -202,6 +201,7 @@ class Shelf:
         state, seen = self._state(), self._seen
         if seen is None or seen.state != state:
             offers = _sorted(self._offers(self._ledger.read()))
+            self._packages.keep()
             seen = self._seen = _Seen(state, offers, tuple(offer.manifest for offer in offers))
         return seen
 
@@ -222,7 +222,7 @@ class Shelf:
         path = package_file_name(name, version)
         for targets in self._ledger.read().publishers.values():
             if path in targets.targets:
-                self._read(targets.targets[path], lambda file: extract(file, folder, self._limits))
+                self._packages.read(targets.targets[path], lambda file: extract(file, folder, self._limits))
                 return
         raise Refused(f"cannot find {name} {version}: it is not in the store")
 
@@ -238,29 +238,14 @@ class Shelf:
         for publisher, targets in [(PUBLISHER, lists.targets), *lists.publishers.items()]:
             for target in targets.targets.values():
                 robots = tuple((target.custom or {}).get("robots", ()))
-                yield Offer(self._manifest(target), publisher, target.length, target.hashes["sha256"], robots)
+                yield Offer(self._packages.manifest(target), publisher, target.length, target.hashes["sha256"], robots)
 
     def _yanked(self, lists: Lists) -> Iterator[Offer]:
         for publisher, targets in lists.publishers.items():
             for path, digest in targets.unrecognized_fields.get(YANKED, {}).items():
                 length = (self.targets / f"{digest}.{path}").stat().st_size
                 target = TargetFile(length, {"sha256": digest}, path)
-                yield Offer(self._manifest(target), publisher, length, digest, (), yanked=True)
-
-    def _manifest(self, target: TargetFile) -> Manifest:
-        key = f"{target.hashes['sha256']}.{target.path}"
-        if key not in self._manifests:
-            self._manifests[key] = self._read(target, lambda file: inspect(file, self._limits)).manifest
-        return self._manifests[key]
-
-    def _read(self, target: TargetFile, read: Callable[[BinaryIO], Contents]) -> Contents:
-        try:
-            with (self.targets / f"{target.hashes['sha256']}.{target.path}").open("rb") as file:
-                target.verify_length_and_hashes(file)
-                file.seek(0)
-                return read(file)
-        except (OSError, RepositoryError, Invalid) as error:
-            raise Bug(f"cannot read {target.path} on the shelf: {error}, restore it from a backup") from None
+                yield Offer(self._packages.manifest(target), publisher, length, digest, (), yanked=True)
 
     def _renew_root(self, lists: Lists) -> None:
         try:
