@@ -150,3 +150,37 @@ def failing() -> Callable[..., Any]:
         assert "At:" not in text
 
     return failing_call
+
+
+@pytest.fixture
+def memory(texted: Simulator) -> Any:
+    return texted.service("ALMemory")
+
+
+@pytest.fixture
+def tts(texted: Simulator) -> Any:
+    return texted.service("ALTextToSpeech")
+
+
+@pytest.fixture
+def events(memory: Any) -> Iterator[Callable[..., list[tuple[str, Any]]]]:
+    """Collects what is raised for keys."""
+    links: list[tuple[Any, int]] = []
+
+    def collect(*keys: str) -> list[tuple[str, Any]]:
+        raised: list[tuple[str, Any]] = []
+        for key in keys:
+            subscriber = memory.subscriber(key)
+            links.append((subscriber, subscriber.signal.connect(lambda value, key=key: raised.append((key, value)))))
+        return raised
+
+    yield collect
+    for subscriber, link in links:
+        subscriber.signal.disconnect(link)
+
+
+@pytest.fixture
+def device(texted: Simulator) -> Iterator[Any]:
+    module = texted.service("ALAudioDevice")
+    yield module
+    module.unsubscribe("Samples")

@@ -1,88 +1,21 @@
-"""S01 to S15 and S19 of the list of attacks on store and metadata: refused by name, and the old version is still there.
+"""S01 to S13 of the list of attacks on store and metadata: refused by name, and the old version is still there.
 
-S16 to S18 need a real line and a real disk: tests/integration/rapp_hop/test_store_line.py. S20: test_shelf.py.
+S14, S15 and S19: test_store_roots.py. S16 to S18 need a real line and a real disk: tests/integration/rapp_hop/test_store_line.py.
+S20: test_shelf.py.
 """
 
 import asyncio
 from collections.abc import Callable
 from datetime import timedelta
-from pathlib import Path
-from typing import Any
 
 import pytest
 from securesystemslib.signer import CryptoSigner
 
-from fakes.packages import source_folder
-from fakes.repository import LASTS, PUBLISHER, Client, Repository
+from fakes.repository import PUBLISHER, Repository
+from fakes.store_robot import ALL, Robot
 from rapp_hop.errors import Refused, Unreachable
-from rapp_hop.hz.archive import build
-from rapp_hop.hz.delivery import Delivery, DeliveryLimits, Recipient
-from rapp_hop.hz.install import Installed
 from rapp_hop.hz.trust import Attack, Untrusted
 from rapp_hop.streaming import Writer
-
-YEARS = timedelta(days=3653)
-NAO = Recipient("nao1", "nao", "1.0")
-ALL = [PUBLISHER, "targets", "snapshot", "timestamp"]
-
-
-class Robot:
-    """Has hello 1.0.0, while its store offers 1.1.0."""
-
-    def __init__(self, repository: Repository, home: Path) -> None:
-        self.client = Client(repository)
-        self.home = home
-        self.old: dict[str, bytes] = {}  # what an attacker may have kept of the line
-        limits = DeliveryLimits(window=0.2)
-        self.delivery = Delivery(self.client, repository.trusted_root, home, limits)  # type: ignore[arg-type]
-
-    async def installs(self, name: str = "hello", version: str | None = None) -> Installed:
-        self.phases: list[str] = []
-        return await self.delivery.install(name, version, lambda phase, _: self.phases.append(phase), NAO)
-
-    def gets(self, name: str = "hello", version: str | None = None) -> str:
-        return asyncio.run(self.installs(name, version)).version
-
-    def refuses(self, attack: Attack, name: str = "hello") -> None:
-        with pytest.raises(Untrusted) as caught:
-            self.gets(name)
-        assert (caught.value.attack, caught.value.reason) == (attack, attack.value), str(caught.value)
-        self.is_as_before()
-
-    def is_as_before(self) -> None:
-        """Nothing was unpacked, of the download is left at most what the next one goes on from, the old version runs."""
-        assert not {"verified", "installed"} & set(self.phases)
-        installed = self.delivery.folder.find("hello")
-        assert installed is not None and installed.version == "1.0.0"
-        assert (installed.path / "agent.py").read_text() == "print('1.0.0')\n"
-        assert sorted(path.name for path in (self.home / "rapps" / "hello").iterdir()) == ["1.0.0", "current"]
-        assert [path.name for path in (self.home / "rapps").iterdir() if path.name != ".lock"] == ["hello"]
-        downloads = self.home / "downloads"
-        assert not downloads.exists() or {path.suffix for path in downloads.iterdir()} <= {".part"}
-
-
-@pytest.fixture
-def package(tmp_path: Path) -> Callable[..., bytes]:
-    def make(version: str, name: str = "hello", **rapp: Any) -> bytes:
-        return build(source_folder(tmp_path / "sources" / name / version, name, version, f"print({version!r})\n", **rapp))
-
-    return make
-
-
-@pytest.fixture
-def repository(package: Callable[..., bytes]) -> Repository:
-    repository = Repository()
-    repository.publish("hello", "1.0.0", package("1.0.0"))
-    return repository
-
-
-@pytest.fixture
-def robot(repository: Repository, package: Callable[..., bytes], tmp_path: Path) -> Robot:
-    robot = Robot(repository, tmp_path / "robot")
-    assert robot.gets() == "1.0.0"
-    robot.old = dict(repository.files)
-    repository.publish("hello", "1.1.0", package("1.1.0"))
-    return robot
 
 
 def test_s00_without_an_attack_the_new_version_comes(robot: Robot) -> None:
@@ -283,95 +216,3 @@ def test_a_cloud_agent_is_never_installed_on_a_robot(robot: Robot, repository: R
         robot.gets("parrot")
     robot.phases.clear()
     robot.is_as_before()
-
-
-def rotate_root(repository: Repository) -> CryptoSigner:
-    old = repository.new_key("root")
-    repository.root.version += 1
-    repository.write_root(old, repository.signers["root"])
-    return old
-
-
-def test_s14_root_rotated_three_times_in_a_row(robot: Robot, repository: Repository) -> None:
-    for _ in range(3):
-        rotate_root(repository)
-    assert robot.gets() == "1.1.0"
-
-
-def test_s14_root_number_skipped_is_not_followed(robot: Robot, repository: Repository) -> None:
-    repository.root.version += 1
-    thief = repository.new_key("timestamp")
-    repository.root.version += 1
-    repository.write_root()
-    assert thief is not None
-    repository.next()
-    robot.refuses(Attack.UNSIGNED)
-
-
-def test_s14_root_of_the_same_number(robot: Robot, repository: Repository) -> None:
-    repository.new_key("timestamp")
-    repository.write_root()
-    repository.files["metadata/2.root.json"] = repository.files["metadata/1.root.json"]
-    robot.refuses(Attack.ROLLBACK)
-
-
-def test_s14_root_signed_by_a_stranger(robot: Repository, repository: Repository) -> None:
-    stranger = Repository()
-    stranger.root.version = 2
-    stranger.write_root()
-    repository.files["metadata/2.root.json"] = stranger.files["metadata/2.root.json"]
-    robot.refuses(Attack.UNSIGNED)
-
-
-def test_s14_root_signed_by_one_key_of_threshold_two(robot: Robot, repository: Repository) -> None:
-    second = CryptoSigner.generate_ed25519()
-    repository.root.add_key(second.public_key, "root")
-    repository.root.roles["root"].threshold = 2
-    repository.root.version += 1
-    repository.write_root(repository.signers["root"], second)
-    assert robot.gets("hello", "1.0.0") == "1.0.0"
-    repository.root.version += 1
-    repository.write_root(second)
-    robot.refuses(Attack.UNSIGNED)
-    repository.write_root(repository.signers["root"], second)
-    assert robot.gets() == "1.1.0"
-
-
-def shift_clock(repository: Repository, by: timedelta) -> None:
-    """The store's clock goes `by` ahead of the robot's."""
-    repository.now += by
-    for signed in repository.lists.values():
-        signed.expires = repository.now + LASTS
-    repository.next()
-
-
-def test_s15_clock_ten_years_back_or_unset(robot: Robot, repository: Repository) -> None:
-    shift_clock(repository, YEARS)
-    robot.refuses(Attack.CLOCK)
-    shift_clock(repository, -YEARS)
-    assert robot.gets() == "1.1.0"
-
-
-def test_s15_clock_ten_years_ahead(robot: Robot, repository: Repository) -> None:
-    shift_clock(repository, -YEARS)
-    robot.refuses(Attack.FREEZE)
-    shift_clock(repository, YEARS)
-    assert robot.gets() == "1.1.0"
-
-
-def test_s15_clock_a_little_behind(robot: Robot, repository: Repository) -> None:
-    shift_clock(repository, timedelta(minutes=50))
-    assert robot.gets() == "1.1.0"
-
-
-def test_s19_two_installations_of_one_rapp_at_once(robot: Robot, repository: Repository) -> None:
-    second = Robot(repository, robot.home)  # another process would come so
-
-    async def both() -> list[Installed]:
-        return list(await asyncio.gather(robot.installs(), robot.installs(), second.installs(), second.installs()))
-
-    done = asyncio.run(both())
-    assert {item.version for item in done} == {"1.1.0"}
-    assert [item.new for item in done].count(True) == 1
-    names = sorted(path.name for path in (robot.home / "rapps" / "hello").iterdir())
-    assert names == ["1.0.0", "1.1.0", "current", "previous"]

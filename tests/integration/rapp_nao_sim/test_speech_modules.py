@@ -1,0 +1,99 @@
+"""The modules that speak and recognise words, as a client written for a real NAO calls them."""
+
+import pytest
+
+
+def test_saying_raises_its_events_in_order(texted, tts, events, wait_for):
+    raised = events("ALTextToSpeech/CurrentSentence", "ALTextToSpeech/TextStarted", "ALTextToSpeech/TextDone")
+    said = []
+    link = texted.service("SimWorld").robotSaid.connect(said.append)
+    assert tts.say("good morning") is None
+    assert tts.say("dzień dobry", "Polish") is None
+    wait_for(lambda: len(raised) == 8 and len(said) == 2)
+    texted.service("SimWorld").robotSaid.disconnect(link)
+    assert said == ["good morning", "dzień dobry"]
+    assert {key.rpartition("/")[2] for key, _value in raised} == {"CurrentSentence", "TextStarted", "TextDone"}
+
+
+def test_languages_by_their_english_names(tts, failing):
+    assert {"English", "Polish", "French", "Portuguese", "Chinese"} <= set(tts.getAvailableLanguages())
+    assert tts.getSupportedLanguages() == tts.getAvailableLanguages()
+    tts.setLanguage("Polish")
+    assert tts.getLanguage() == "Polish"
+    with failing("ALTextToSpeech::setLanguage", "language Elvish is not installed"):
+        tts.setLanguage("Elvish")
+    assert tts.getLanguage() == "Polish"
+    tts.setLanguage("English")
+    with failing("ALTextToSpeech::say", "language Elvish is not installed"):
+        tts.say("mellon", "Elvish")
+
+
+def test_volume_and_speed_are_bounded(tts, failing):
+    tts.setVolume(7.0)
+    assert tts.getVolume() == 1.0
+    tts.setParameter("speed", 80.0)
+    tts.setParameter("pitchShift", 1.2)
+    with failing("ALTextToSpeech::setVolume", "could not convert"):
+        tts.setVolume("loud")
+
+
+@pytest.mark.parametrize("arguments", [(), (5,), ("a", "English", "b")])
+def test_saying_wrongly_is_an_error(tts, failing, arguments):
+    with failing("ALTextToSpeech::say", ""):
+        tts.say(*arguments)
+
+
+@pytest.fixture
+def recognition(texted):
+    module = texted.service("ALSpeechRecognition")
+    yield module
+    module.unsubscribe("test")
+    module.pause(False)
+
+
+def test_words_are_recognised_in_the_order_rapp_used(texted, recognition, memory, events, wait_for):
+    raised = events("WordRecognized")
+    recognition.setLanguage("English")
+    recognition.pause(True)
+    recognition.setVocabulary(["E-mail", "clock"], False)
+    recognition.pause(False)
+    recognition.subscribe("test", 500, 0.0)
+    assert memory.getData("WordRecognized") == ["", -3.0]
+    texted.service("SimWorld").micText("e-mail")
+    wait_for(lambda: bool(raised))
+    assert raised == [("WordRecognized", ["E-mail", 1.0])]
+    assert memory.getData("LastWordRecognized") == ["E-mail", 1.0]
+    texted.service("SimWorld").micText("thunderstorm")
+    wait_for(lambda: len(raised) == 2)
+    assert raised[1][1][1] < 0.4
+
+
+def test_a_vocabulary_needs_a_pause_and_words(recognition, failing):
+    recognition.setVocabulary(["clock"], False)
+    recognition.subscribe("test")
+    with failing("ALSpeechRecognition::setVocabulary", "pause it first"):
+        recognition.setVocabulary(["e-mail"], False)
+    recognition.pause(True)
+    for words in ([], ["clock", " "], "clock", [1], None):
+        with failing("ALSpeechRecognition::setVocabulary", "cannot use this vocabulary"):
+            recognition.setVocabulary(words, False)
+    recognition.setWordListAsVocabulary(["e-mail"])
+
+
+def test_only_english_is_heard(recognition, failing):
+    assert recognition.getAvailableLanguages() == ["English"]
+    assert recognition.getLanguage() == "English"
+    with failing("ALSpeechRecognition::setLanguage", "language Polish is not installed"):
+        recognition.setLanguage("Polish")
+
+
+def test_what_has_nothing_to_set_is_accepted(texted, recognition):
+    recognition.setParameter("Sensitivity", 0.5)
+    recognition.setAudioExpression(False)
+    recognition.setVisualExpression(False)
+    texted.service("ALSoundDetection").setParameter("Sensitivity", 0.7)
+
+
+def test_unsubscribing_what_never_subscribed_is_no_error(texted, recognition):
+    recognition.unsubscribe("nobody")
+    texted.service("ALSoundDetection").unsubscribe("nobody")
