@@ -4,6 +4,7 @@ The core agent's end of the channel stays here, so that a RApp whose event loop 
 goes on, and its count is that of node's event loop.
 """
 
+import logging
 import os
 import socket
 import subprocess
@@ -33,6 +34,8 @@ PASSED_ON: Mapping[str, tuple[str, ...]] = {
     "terminate": ("outcome", "detail"),
 }
 """What node's side tells the core agent, and the texts in it."""
+
+_log = logging.getLogger(__name__)
 
 
 class Engine:
@@ -73,8 +76,12 @@ class Engine:
 
 
 def warm_up(wanted: str) -> Engine | None:
-    """The engine, started ahead, when `wanted` is this language."""
-    return Engine() if wanted == RUNTIME else None
+    """The engine, started ahead, when `wanted` is this language; without it this process can still be any other RApp."""
+    try:
+        return Engine() if wanted == RUNTIME else None
+    except OSError as error:
+        _log.error("cannot keep node warm: %s", error)
+        return None
 
 
 def live(channel: Channel, order: dict[str, Any], lost: Callable[[], None], bounds: Bounds, engine: Engine) -> int:
