@@ -11,7 +11,7 @@ from email.policy import default
 from pathlib import Path
 
 from rapp_cli.demo.config import DemoConfig
-from rapp_cli.demo.story import THINKING, ask
+from rapp_cli.demo.story import converse
 from rapp_cli.demo.system import System
 from rapp_cli.person import Person
 from rapp_cli.timeline import Timeline
@@ -55,21 +55,15 @@ class Hazard:
         if self._config.start:
             await person.ask_room("startAt", self._config.start)
         await person.ask_room("takeTouched")
-        started = await ask(person, self._config.command, timeline)
-        answering = asyncio.create_task(self._answer(person))
-        try:
-            await timeline.wait_for("core", "entered", "s3", started)
-        finally:
-            answering.cancel()
+        await converse(person, self._config.command, timeline, self._reply)
         self._truth = Truth(abs(math.degrees(await person.ask_room("getDoor"))), await person.ask_room("getLamp"))
         self._touched = await person.ask_room("takeTouched")
 
-    async def _answer(self, person: Person) -> None:
-        """Say yes or no to the robot's question."""
-        while True:
-            if "shall I write" in await person.next_heard():
-                await asyncio.sleep(THINKING)
-                await person.say("yes" if self._config.write else "no")
+    def _reply(self, heard: str) -> str | None:
+        """Yes or no to the robot's question."""
+        if "shall I write" not in heard:
+            return None
+        return "yes" if self._config.write else "no"
 
     async def judge(self, timeline: Timeline) -> int:
         """0 only when what was said of door and lamp is so, a mail has come if one was asked for, and nothing was touched."""

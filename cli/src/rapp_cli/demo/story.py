@@ -1,6 +1,7 @@
 """What the stories of the demo have in common: a person asks for a RApp, and it is judged by what it has left."""
 
 import asyncio
+from collections.abc import Callable
 from typing import Protocol
 
 from rapp_cli.errors import CommandError
@@ -10,6 +11,7 @@ from rapp_cli.timeline import Timeline
 THINKING = 0.6  # s, between hearing the robot and answering: people do not answer at once, and recognisers start up
 PATIENCE = 15.0  # s without an answer after which the person asks again
 ASKS = 4  # how often the person asks before giving up
+Reply = Callable[[str], str | None]  # what the person says to what the robot has said; None: nothing
 
 
 class Story(Protocol):
@@ -33,3 +35,21 @@ async def ask(person: Person, command: str, timeline: Timeline) -> int:
         except TimeoutError:
             continue
     raise CommandError(f"cannot get the robot to start a RApp for “{command}”; see the timeline above")
+
+
+async def converse(person: Person, command: str, timeline: Timeline, reply: Reply) -> None:
+    """Ask for a RApp, and reply to the robot until it listens again. Raises CommandError when it is never understood."""
+    started = await ask(person, command, timeline)
+    replying = asyncio.create_task(_reply(person, reply))
+    try:
+        await timeline.wait_for("core", "entered", "s3", started)
+    finally:
+        replying.cancel()
+
+
+async def _reply(person: Person, reply: Reply) -> None:
+    while True:
+        words = reply(await person.next_heard())
+        if words is not None:
+            await asyncio.sleep(THINKING)
+            await person.say(words)

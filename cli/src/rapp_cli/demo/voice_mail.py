@@ -1,12 +1,11 @@
 """The story of the paper: a person asks for voice-mail, names whom they write to, speaks; a mail arrives."""
 
 import asyncio
-import contextlib
 import sys
 
 from rapp_cli.demo import mailbox
 from rapp_cli.demo.config import DemoConfig
-from rapp_cli.demo.story import THINKING, ask
+from rapp_cli.demo.story import converse
 from rapp_cli.demo.system import System
 from rapp_cli.person import Person
 from rapp_cli.timeline import Timeline
@@ -23,25 +22,14 @@ class VoiceMail:
 
     async def live(self, person: Person, timeline: Timeline) -> None:
         """Ask for it, and answer it until the robot listens again."""
-        started = await ask(person, self._config.command, timeline)
-        answering = asyncio.create_task(self._answer(person))
-        try:
-            await timeline.wait_for("core", "entered", "s3", started)
-        finally:
-            answering.cancel()
+        await converse(person, self._config.command, timeline, self._reply)
 
-    async def _answer(self, person: Person) -> None:
-        """Say the recipient's name or the message, whichever the robot has just asked for."""
-        while True:
-            heard = (await person.next_heard()).lower()
-            if "recording message" in heard:
-                reply = self._config.message
-            elif "recognition" in heard or "again" in heard:
-                reply = self._config.recipient
-            else:
-                continue
-            await asyncio.sleep(THINKING)
-            await person.say(reply)
+    def _reply(self, heard: str) -> str | None:
+        """The recipient's name or the message, whichever the robot has just asked for."""
+        heard = heard.lower()
+        if "recording message" in heard:
+            return self._config.message
+        return self._config.recipient if "recognition" in heard or "again" in heard else None
 
     async def judge(self, timeline: Timeline) -> int:
         """0 only when the mail arrived with the spoken message in it."""
@@ -50,12 +38,13 @@ class VoiceMail:
             accepted = any(e.kind == "message" and "delivered" in e.detail for e in timeline.entries)
             print(f"rapp demo: {config.mail.host} {'accepted the mail' if accepted else 'has not accepted a mail'}")
             return 0 if accepted else 1
-        with contextlib.suppress(TimeoutError):
+        try:
             async with asyncio.timeout(5):
                 delivered = await mailbox.wait_for_mail(system.maildir, config.folder / "received")
-                return await self._judge_words(delivered)
-        print(f"rapp demo: no mail arrived in {system.maildir}; the logs are in {system.logs}", file=sys.stderr)
-        return 1
+        except TimeoutError:
+            print(f"rapp demo: no mail arrived in {system.maildir}; the logs are in {system.logs}", file=sys.stderr)
+            return 1
+        return await self._judge_words(delivered)
 
     async def _judge_words(self, delivered: mailbox.Delivered) -> int:
         message = self._config.message

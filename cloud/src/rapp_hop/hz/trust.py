@@ -99,10 +99,7 @@ class TrustedStore:
         :raises Untrusted: naming the attack
         :raises Unreachable: when the store cannot be reached or is not complete
         """
-        with self._lock, translated(Attack.MIX_AND_MATCH), self._alone():
-            updater = self._updater()
-            updater.refresh()
-            self._check_clock()
+        with self._refreshed() as updater:
             releases, yanked = [], set()
             for targets in self._lists(updater, f"{check_name(name)}-0.hz"):
                 found = [_release(path, target) for path, target in targets.targets.items()]
@@ -117,10 +114,7 @@ class TrustedStore:
         :raises Untrusted: naming the attack
         :raises Unreachable: when the store cannot be reached or is not complete
         """
-        with self._lock, translated(Attack.MIX_AND_MATCH), self._alone():
-            updater = self._updater()
-            updater.refresh()
-            self._check_clock()
+        with self._refreshed() as updater:
             targets = self._cached("targets", Targets)
             roles = (targets.delegations.roles or {}) if targets.delegations else {}
             named = [(name, role.paths[0]) for name, role in roles.items() if role.paths and publisher in (None, name)]
@@ -152,6 +146,14 @@ class TrustedStore:
                 if not resumed:
                     raise
                 updater.download_target(target, os.devnull)  # what was here of it may be to blame
+
+    @contextmanager
+    def _refreshed(self) -> Iterator[Updater]:
+        with self._lock, translated(Attack.MIX_AND_MATCH), self._alone():
+            updater = self._updater()
+            updater.refresh()
+            self._check_clock()
+            yield updater
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
