@@ -52,6 +52,7 @@ class _Seen:
     state: tuple[int, int]  # of the timestamp's file
     offers: list[Offer]
     manifests: tuple[Manifest, ...]
+    files: dict[str, str]  # on offer to everybody: by the package's file name, that of the file here
 
 
 class Shelf:
@@ -202,7 +203,7 @@ class Shelf:
         if seen is None or seen.state != state:
             offers = _sorted(self._offers(self._ledger.read()))
             self._packages.keep()
-            seen = self._seen = _Seen(state, offers, tuple(offer.manifest for offer in offers))
+            seen = self._seen = _Seen(state, offers, tuple(offer.manifest for offer in offers), _files(offers))
         return seen
 
     def _state(self) -> tuple[int, int]:
@@ -228,11 +229,8 @@ class Shelf:
 
     def file_of(self, path: str) -> Path | None:
         """Return where a package on offer to everybody lies, by its file name; None: there is none."""
-        for targets in self._ledger.read().publishers.values():
-            target = targets.targets.get(path)
-            if target is not None and not (target.custom or {}).get("robots"):
-                return self.targets / f"{target.hashes['sha256']}.{path}"
-        return None
+        name = self._look().files.get(path)
+        return self.targets / name if name else None
 
     def _offers(self, lists: Lists) -> Iterator[Offer]:
         for publisher, targets in [(PUBLISHER, lists.targets), *lists.publishers.items()]:
@@ -273,6 +271,11 @@ def _desk(lists: Lists, name: str, publisher: str | None) -> tuple[str, Targets,
 
 def _sorted(offers: Iterable[Offer]) -> list[Offer]:
     return sorted(offers, key=lambda offer: (offer.manifest.name, offer.manifest.version.key))
+
+
+def _files(offers: Iterable[Offer]) -> dict[str, str]:
+    paths = ((package_file_name(each.manifest.name, each.manifest.version.text), each) for each in offers)
+    return {path: f"{each.sha256}.{path}" for path, each in paths if not each.robots}
 
 
 def _known(own: Targets, path: str) -> str | None:

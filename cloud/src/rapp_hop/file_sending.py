@@ -78,8 +78,9 @@ class _Pump:
     async def done(self) -> None:
         """Wait until all of it has gone. Raises as `send_file`."""
         try:
-            self._loop.add_writer(self._line, self._move)
             self._move()
+            if not self._done.done():
+                self._loop.add_writer(self._line, self._move)
             await self._done
         finally:
             self._loop.remove_writer(self._line)
