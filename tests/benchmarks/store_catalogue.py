@@ -19,6 +19,7 @@ from rapp_cloud.ledger import Ledger
 from rapp_hop.client import HopClient
 from rapp_hop.hz.archive import build, package_file_name
 
+MEANT = ("winter_song", ["sing the winter song for me", "would you sing my winter song", "I want you to sing a winter song"])
 PUBLISHERS = 100  # who share the RApps
 REGISTER = {"kind": "nao", "api_version": "1.0"}
 
@@ -58,23 +59,22 @@ def measure(folder: Path, options: argparse.Namespace) -> None:
 
 def _column(folder: Path, count: int, options: argparse.Namespace) -> dict[str, str]:
     folder.mkdir()
-    platform, rapps = Platform(folder), invented(count)
+    platform, rapps = Platform(folder), [MEANT, *invented(count - 1)]
     fill(platform, rapps)
-    said = _spoken(folder / "said.wav", rapps[count // 2][1][0])
+    said = _spoken(folder / "said.wav", MEANT[1][0])
     found: dict[str, str] = {}
-    for start in ("first start", "start again"):
+    for start in ("first start", "next start"):
         began = clock()
         with platform.serving():
             found[f"{start}, s"] = f"{platform.ready - began:.2f}"
-            if start == "start again":
-                found |= asyncio.run(_served(platform, rapps, said, options))
+            found[f"{start}, until all is learnt, s"] = f"{platform.settled - began:.1f}"
+            if start == "next start":
+                found |= asyncio.run(_served(platform, said, options))
     shutil.rmtree(folder)
     return found
 
 
-async def _served(
-    platform: Platform, rapps: list[tuple[str, list[str]]], said: Path, options: argparse.Namespace
-) -> dict[str, str]:
+async def _served(platform: Platform, said: Path, options: argparse.Namespace) -> dict[str, str]:
     client = HopClient(platform.url, platform.token)
     beating = asyncio.create_task(_stay(client))
 
@@ -91,7 +91,7 @@ async def _served(
             "list, p50 and p99 ms": await _often(listed, options.calls),
             "first interpretation, s": f"{await _took(interpret):.2f}",
             "interpretation, p50 and p99 ms": await _often(interpret, options.calls),
-            "the RApp meant is the answer's": _place(await interpret(), rapps[len(rapps) // 2][0]),
+            "the RApp meant is candidate": _place(await interpret(), MEANT[0]),
         }
         one_more = write_rapp(platform.data.parent / "one_more", "one_more", sentences=["juggle seven oranges for the children"])
         began = clock()

@@ -16,6 +16,7 @@ from fakes.processes import children, stat
 from rapp_cloud.memory import open_memory
 
 PATIENCE = 120.0  # s
+LEARNING = 600.0  # s that a platform may take to learn what it offers
 MEGABYTE = 2**20
 
 
@@ -46,7 +47,7 @@ class Platform:
         self.log = folder / "cloud.log"
         self.port = 0
         self.pid = 0
-        self.ready = 0.0  # by `clock`
+        self.ready = self.settled = 0.0  # by `clock`: serving; with nothing left to do
         self.command("init", "--robot", "nao", "--host", "127.0.0.1")
         self.token = (self.data / "robots" / "nao.token").read_text()
         self.certificate = self.data / "tls" / "certificate.pem"
@@ -98,9 +99,10 @@ class Platform:
             process.communicate()
 
     def _settle(self) -> None:
-        """Wait until its worker processes have loaded their models."""
-        deadline, used = clock() + PATIENCE, -1.0
-        while clock() < deadline:
+        """Wait until its worker processes have loaded their models and learnt what is on offer."""
+        used = -1.0
+        while clock() < self.ready + LEARNING:
+            self.settled = clock()
             before, used = used, cpu(family(self.pid))
             if used - before < 0.02:
                 return
