@@ -7,6 +7,7 @@ those of when it was read and verified; robots verify what they get in any case.
 import logging
 import os
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -17,13 +18,16 @@ from tuf.api.metadata import TargetFile  # type: ignore[attr-defined]  # public,
 from rapp_cloud.files import write_whole
 from rapp_hop.errors import Bug, Invalid
 from rapp_hop.hz.archive import Contents, inspect
-from rapp_hop.hz.manifest import Manifest, parse_manifest
+from rapp_hop.hz.manifest import Manifest, Needs, Permissions
+from rapp_hop.hz.semver import parse_version
 from rapp_hop.hz.tar import Limits
 
 _SPARE = 1000  # lines that count no more, beside as many as count, until the index is written anew
 _log = logging.getLogger(__name__)
 
-_Line = tuple[int, int, str]  # size in bytes, time of the last change in ns, package.json
+_FIELDS = {field.name for field in fields(Manifest)}
+
+_Line = tuple[int, int, Any]  # size in bytes, time of the last change in ns, the manifest's fields
 
 
 class PackageFiles:
@@ -79,17 +83,14 @@ class PackageFiles:
         line = self._lines.get(name)
         if line is None or line[:2] != self._state(name) or line[0] != target.length:
             return None
-        try:
-            return parse_manifest(line[2].encode())
-        except Invalid:  # of another version of the platform
-            return None
+        return _manifest_of(line[2])
 
     def _inspected(self, target: TargetFile, name: str) -> Manifest:
         state = self._state(name)
-        contents = self.read(target, lambda file: inspect(file, self._limits))
+        manifest = self.read(target, lambda file: inspect(file, self._limits)).manifest
         if state is not None:
-            self._new[name] = (*state, contents.raw.decode())
-        return contents.manifest
+            self._new[name] = (*state, manifest)
+        return manifest
 
     def _state(self, name: str) -> tuple[int, int] | None:
         try:
@@ -108,10 +109,10 @@ class PackageFiles:
         for line in data.splitlines():
             count += bool(line)
             try:
-                name, size, time, text = orjson.loads(line)
+                name, size, time, manifest = orjson.loads(line)
             except ValueError:
                 continue
-            found[str(name)] = (size, time, str(text))
+            found[str(name)] = (size, time, manifest)
         if count > 2 * len(found) + _SPARE:
             self._write_anew(found)
         return found
@@ -125,3 +126,24 @@ class PackageFiles:
 
 def _name(target: Any) -> str:
     return f"{target.hashes['sha256']}.{target.path}"
+
+
+def _manifest_of(found: Any) -> Manifest | None:
+    """Return a manifest that was checked before it went into the index; None: it is of another version of the platform."""
+    if not isinstance(found, dict) or found.keys() != _FIELDS:
+        return None
+    try:
+        return Manifest(**{
+            **found,
+            "version": parse_version(found["version"]["text"]),
+            "keywords": _tuples(found["keywords"]),
+            "sentences": _tuples(found["sentences"]),
+            "permissions": Permissions(**_tuples(found["permissions"])),
+            "needs": Needs(tuple(found["needs"]["robot"]), found["needs"]["api"]),
+        })  # fmt: skip
+    except (AttributeError, KeyError, TypeError, Invalid):
+        return None
+
+
+def _tuples(lists: dict[str, list[str]]) -> dict[str, tuple[str, ...]]:
+    return {name: tuple(texts) for name, texts in lists.items()}

@@ -30,7 +30,6 @@ class Contents:
 
     manifest: Manifest
     members: tuple[Member, ...]
-    raw: bytes  # package.json
 
     @property
     def for_hop(self) -> bool:
@@ -119,7 +118,7 @@ def _contents(seen: list[Member], manifest_bytes: bytes | None) -> Contents:
         raise Invalid(f"cannot unpack: the top folder is {seen[0].path[0]!r}, the manifest says {manifest.name!r}")
     if not any(not member.folder and "/".join(member.path[1:]) == manifest.entry for member in seen):
         raise Invalid(f"cannot unpack: the entry {manifest.entry!r} is not a file of the package")
-    return Contents(manifest, tuple(seen), manifest_bytes)
+    return Contents(manifest, tuple(seen))
 
 
 def _write(destination: Path, member: Member, pieces: Iterable[bytes]) -> None:
