@@ -2,6 +2,7 @@
 
 import argparse
 import asyncio
+import resource
 import shutil
 import subprocess
 import tempfile
@@ -11,7 +12,7 @@ from typing import Any
 
 from tuf.api.metadata import TargetFile  # type: ignore[attr-defined]  # public, but not in __all__
 
-from benchmarks.store_stage import Platform, clock, family, memory, share, write_rapp
+from benchmarks.store_stage import Platform, clock, cpu, family, memory, share, write_rapp
 from benchmarks.store_words import invented
 from rapp_cloud.custody import add_publisher, delegated, pattern
 from rapp_cloud.keys import KeyRing
@@ -88,16 +89,16 @@ async def _served(platform: Platform, said: Path, options: argparse.Namespace) -
         await client.call("register", REGISTER)
         found = {
             "first list, s": f"{await _took(listed):.2f}",
-            "list, p50 and p99 ms": await _often(listed, options.calls),
+            **await _often("list", listed, platform, options.calls),
             "first interpretation, s": f"{await _took(interpret):.2f}",
-            "interpretation, p50 and p99 ms": await _often(interpret, options.calls),
+            **await _often("interpretation", interpret, platform, options.calls),
             "the RApp meant is candidate": _place(await interpret(), MEANT[0]),
         }
         one_more = write_rapp(platform.data.parent / "one_more", "one_more", sentences=["juggle seven oranges for the children"])
-        began = clock()
+        began, used = clock(), _of_children()
         await asyncio.to_thread(platform.publish, one_more)
         found |= {
-            "publish one more, s": f"{clock() - began:.2f}",
+            "publish one more, s, its CPU s": f"{clock() - began:.2f} {_of_children() - used:.2f}",
             "next list, s": f"{await _took(listed):.2f}",
             "next interpretation, s": f"{await _took(interpret):.2f}",
         }
@@ -125,9 +126,20 @@ async def _took(work: Callable[[], Awaitable[Any]]) -> float:
     return clock() - began
 
 
-async def _often(work: Callable[[], Awaitable[Any]], calls: int) -> str:
+async def _often(name: str, work: Callable[[], Awaitable[Any]], platform: Platform, calls: int) -> dict[str, str]:
+    pids = family(platform.pid)
+    used = cpu(pids)
     took = [await _took(work) for _ in range(calls)]
-    return f"{1000 * share(took, 0.5):.0f} {1000 * share(took, 0.99):.0f}"
+    return {
+        f"{name}, p50 and p99 ms": f"{1000 * share(took, 0.5):.0f} {1000 * share(took, 0.99):.0f}",
+        f"{name}, the platform's CPU ms": f"{1000 * (cpu(pids) - used) / calls:.0f}",
+    }
+
+
+def _of_children() -> float:
+    """Processor seconds of commands that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def _place(answer: dict[str, Any], meant: str) -> str:
