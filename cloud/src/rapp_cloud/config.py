@@ -36,7 +36,7 @@ class CloudConfig:
     lease: float = 15.0  # seconds without a heartbeat until a robot counts as gone
     agents: int = 32  # cloud agents at once
     agents_of_one: int = 4  # of one robot
-    publisher_quota: int = 1024  # MiB of all packages of one publisher who publishes from elsewhere
+    publisher_quota: int = 1024  # MiB of all packages and lists of one publisher who publishes from elsewhere
     refresh: float = 3600.0  # seconds between two new timestamps of the store
 
     @property

@@ -68,7 +68,7 @@ class Custody:
             lists = self._ledger.read()
             taken = {*ROLES, *ROOTS, *delegated(lists)}
             if check_name(publisher) in taken or publisher.startswith("next_"):
-                raise Refused(f"cannot make the publisher {publisher}: the name is taken")
+                raise Refused(f"cannot make the publisher {publisher}: the name is taken, see ./rapp keys list")
             if application is not None:
                 self._ledger.write(lists, ["targets"], admit(self._ledger, lists, application))
                 return

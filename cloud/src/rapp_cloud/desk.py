@@ -41,7 +41,7 @@ class Desk:
     def publish(self, publisher: str, package: Path, data: bytes, note: Note, quota: int, *, check: bool = False) -> Manifest:
         """Put a package on offer, with its publisher's signed list.
 
-        :param quota: bytes of all packages of one publisher, yanked ones too
+        :param quota: bytes of all packages and lists of one publisher that are here, yanked ones too
         :param check: only judge, change nothing
         :raises HopError: see `judge` and `check_publication`; also when the package is not the one of the list
         """
@@ -55,26 +55,29 @@ class Desk:
                 raise Invalid(f"cannot publish {path}: the list must have this one package more, and all that were there")
             _check_same(change.added, manifest, length, digest)
             check_publication(manifest, self._offered())
-            self._check_quota(standing, path, length, quota)
+            self._check_quota(standing, length + len(data), quota, path)
             if not check:
                 note("publish", f"{manifest.name} {manifest.version}")
                 copy_whole(package, self._targets / f"{digest}.{path}")
                 self._put(lists, publisher, change)
         return manifest
 
-    def replace(self, publisher: str, data: bytes, note: Note) -> Change:
+    def replace(self, publisher: str, data: bytes, note: Note, quota: int) -> Change:
         """Take packages off offer, or have the same ones on offer for longer, by their publisher's signed list.
 
+        :param quota: see `publish`; packages may be taken off offer beyond it
         :raises HopError: see `judge`; also when the list has a package more
         """
         with self._ledger.locked():
             lists = self._ledger.read()
-            change = judge(standing_of(lists, publisher), data, datetime.now(UTC))
+            standing = standing_of(lists, publisher)
+            change = judge(standing, data, datetime.now(UTC))
             if change.added is not None:
                 raise Invalid(f"cannot take the list: {change.added.path} must come with it, use ./rapp publish")
             for path in change.withdrawn:
                 note("yank", path.removesuffix(".hz").replace("-", " ", 1))
             if not change.withdrawn:
+                self._check_quota(standing, len(data), quota)
                 note("renew", f"list {change.own.version}")
             self._put(lists, publisher, change)
         return change
@@ -93,11 +96,13 @@ class Desk:
             raise Invalid(f"cannot publish {contents.manifest.name}: it has no etc/weblet.info, build it with ./rapp hz build")
         return contents.manifest, package.stat().st_size, digest
 
-    def _check_quota(self, standing: Standing, path: str, length: int, quota: int) -> None:
-        files = (self._targets / f"{digest}.{known}" for known, digest in standing.known.items() if known != path)
+    def _check_quota(self, standing: Standing, length: int, quota: int, path: str = "") -> None:
+        """Check that `length` bytes more are not too many; what lies here of `path` is to be replaced."""
+        packages = (self._targets / f"{digest}.{known}" for known, digest in standing.known.items() if known != path)
+        files = [*packages, *self._ledger.folder.glob(f"*.{standing.publisher}.json")]
         used = sum(file.stat().st_size for file in files if file.exists())
         if used + length > quota:
-            text = f"cannot publish {path}: {used + length} bytes would be {standing.publisher}'s, {quota} are allowed"
+            text = f"cannot take {path or 'the list'}: {used + length} bytes would be {standing.publisher}'s, {quota} are allowed"
             raise Refused(f"{text}; ask who keeps the platform for more", 413)
 
 

@@ -23,7 +23,6 @@ from rapp_hop.hz.text import check_name
 STALE = 409  # HTTP status: the list was made of another one than is on offer
 SHORTEST, LONGEST = timedelta(days=1), timedelta(days=400)  # that a list may be good
 MAX_ROBOTS = 1000  # that a package may be for
-_MAX_SIGNATURES = 8
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ def _parsed(standing: Standing, data: bytes) -> Targets:
     strict_json.loads(data, limit=MAX_LIST)  # one reading only: robots may use another reader
     try:
         metadata = Metadata[Any].from_bytes(data)
-        if not isinstance(metadata.signed, Targets) or metadata.unrecognized_fields or len(metadata.signatures) > _MAX_SIGNATURES:
+        if not isinstance(metadata.signed, Targets) or isinstance(metadata.signed.version, bool):
             raise Invalid("cannot take the list: it is of another kind, sign it with ./rapp publish")
         standing.targets.verify_delegate(standing.publisher, metadata.signed_bytes, metadata.signatures)
     except UnsignedMetadataError:
@@ -73,7 +72,16 @@ def _parsed(standing: Standing, data: bytes) -> Targets:
         ) from None
     except (DeserializationError, RepositoryError, ValueError):
         raise Invalid("cannot take the list: it is no list of packages, sign it with ./rapp publish") from None
+    _check_spelling(standing, data, metadata)
     return metadata.signed
+
+
+def _check_spelling(standing: Standing, data: bytes, metadata: Metadata[Any]) -> None:
+    """Nothing around what was signed: no words, signatures or spaces that could be of any length."""
+    signatures = metadata.signatures
+    more = metadata.unrecognized_fields or any(signature.unrecognized_fields for signature in signatures.values())
+    if more or set(signatures) - set(standing.role.keyids) or data != metadata.to_bytes():
+        raise Invalid("cannot take the list: there is more in it than was signed, sign it with ./rapp publish")
 
 
 def _check_number(standing: Standing, own: Targets) -> None:
@@ -105,7 +113,9 @@ def _check_older(standing: Standing, own: Targets) -> None:
 
 
 def _check_new(standing: Standing, target: TargetFile) -> None:
-    custom = copy.copy(target.custom or {})
+    if not isinstance(target.custom, dict):
+        raise Invalid(f"cannot take {target.path[:200]!r}: the list does not say what it is, sign it with ./rapp publish")
+    custom = copy.copy(target.custom)
     name, version = check_name(str(custom.pop("name", ""))), parse_version(str(custom.pop("version", "")))
     robots = custom.pop("robots", [])
     if target.path != package_file_name(name, version.text) or custom or set(target.unrecognized_fields) - {"custom"}:

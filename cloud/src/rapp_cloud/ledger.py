@@ -23,6 +23,7 @@ from rapp_hop.errors import Refused
 from rapp_hop.hz.lock import held
 from rapp_hop.hz.trust import SIGNED_AT
 
+_KEPT = timedelta(days=1)  # that a list stays after another has followed it: robots may be about to read it
 _NEXT = "next_"  # begin of the name of a key that a rotation has made and not yet put in its place
 
 
@@ -91,7 +92,7 @@ class Ledger:
     def write(self, lists: Lists, changed: Iterable[str], given: Mapping[str, bytes] | None = None) -> None:
         """Sign and write the changed lists anew (targets, publishers), then snapshot and timestamp.
 
-        "snapshot" among the changed has that signed anew; nothing changed: the timestamp alone.
+        "snapshot" among the changed has that signed anew; nothing changed: the timestamp alone, and old lists go.
 
         :param given: publishers' lists that were signed elsewhere; `lists` has them too
         """
@@ -113,6 +114,8 @@ class Ledger:
         self._sign(lists, "timestamp", lists.timestamp, self.expiry.timestamp)
         for name in (*ROLES, *ROOTS[1:], *lists.publishers):
             self._settle_believed(lists, name)
+        if not names:
+            self._forget(lists)
 
     def write_root(self, root: Root, signers: Iterable[CryptoSigner]) -> None:
         """Sign a root with all of these and write it."""
@@ -180,6 +183,18 @@ class Ledger:
         """Hold the store alone; other processes may publish too."""
         with held(self.folder.parent / ".lock", "change the store"):
             yield
+
+    def _forget(self, lists: Lists) -> None:
+        """Remove lists that others have followed long ago; roots stay, robots go from each to the next."""
+        newest = {"snapshot": lists.snapshot.version}
+        newest |= {path.removesuffix(".json"): meta.version for path, meta in lists.snapshot.meta.items()}
+        last = (datetime.now(UTC) - _KEPT).timestamp()
+        for name, version in newest.items():
+            old = [(int(path.name.split(".")[0]), path) for path in self.folder.glob(f"[0-9]*.{name}.json")]
+            written = {number: path.stat().st_mtime for number, path in old}
+            for number, path in old:
+                if number < version and written.get(number + 1, last) < last:
+                    path.unlink()
 
     def _settle_believed(self, lists: Lists, name: str) -> None:
         if self.keys.has(_NEXT + name) and self.keys.signer(_NEXT + name).public_key.keyid in _keyids(lists, name):

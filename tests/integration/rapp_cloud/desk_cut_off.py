@@ -34,7 +34,7 @@ def publish(shelf: Shelf, maria: Publisher, folder: Path) -> None:
 
 
 def yank(shelf: Shelf, maria: Publisher, folder: Path) -> None:
-    shelf.desk.replace("maria", (folder / "yank.list").read_bytes(), nothing)
+    shelf.desk.replace("maria", (folder / "yank.list").read_bytes(), nothing, 2**30)
 
 
 def rotate(shelf: Shelf, maria: Publisher, folder: Path) -> None:

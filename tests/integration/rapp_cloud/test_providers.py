@@ -4,6 +4,7 @@ import asyncio
 import copy
 import hashlib
 import io
+import os
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
@@ -148,6 +149,9 @@ def test_both_packages_of_a_four_agent_rapp(
     Path(rapp(tmp_path, "kitchen", partner="kitchen_cloud")).rename(tmp_path / "dynamic")
     assert karl.far(capsys, "publish", str(tmp_path)) == 1 and "./rapp keys grant karl kitchen_cloud" in karl.err
     assert karl.owner(capsys, "keys", "grant", "karl", "kitchen_cloud") == 0
+    assert karl.far(capsys, "publish", str(tmp_path), "--check") == 0, karl.err
+    assert "can be published: kitchen_cloud 1.0.0" in karl.out and "before kitchen_cloud is on offer: kitchen 1.0.0" in karl.out
+    assert karl.owner(capsys, "publish", str(tmp_path), "--check") == 0 and "can be published: kitchen 1.0.0" in karl.out
     assert karl.far(capsys, "publish", str(tmp_path)) == 0, karl.err
     assert [line.split(",")[0] for line in karl.out.splitlines()] == ["on offer: kitchen_cloud 1.0.0", "on offer: kitchen 1.0.0"]
     assert listed(cloud)["kitchen"] == "1.0.0" and "kitchen_cloud" not in listed(cloud)
@@ -195,6 +199,17 @@ def test_what_is_wrong_at_home_is_said_there(
     assert otto.far(capsys, "publish", rapp(tmp_path / "d", "oven")) == 2 and "0600" in otto.err
     otto.token.chmod(0o600)
     assert otto.run(capsys, "publish", rapp(tmp_path / "e", "oven"), "--cloud", "http://cloud.example") == 2
+    nonsense, source = tmp_path / "nonsense", rapp(tmp_path / "n", "oven")
+    nonsense.write_bytes(b"\xff nonsense")
+    nonsense.chmod(0o600)
+    right = {name: os.environ[name] for name in ("RAPP_ROOT_FILE", "RAPP_CLOUD_CA_FILE")}
+    for name, file in right.items():
+        monkeypatch.setenv(name, str(nonsense))
+        assert otto.far(capsys, "publish", source) == 2 and name in otto.err
+        monkeypatch.setenv(name, file)
+    kept, otto.token = otto.token, nonsense
+    assert otto.far(capsys, "publish", source) == 2 and "it holds no token" in otto.err
+    otto.token = kept
     monkeypatch.delenv("RAPP_ROOT_FILE")
     assert otto.far(capsys, "publish", rapp(tmp_path / "f", "oven")) == 2 and "RAPP_ROOT_FILE" in otto.err
     other = tmp_path / "other.json"
@@ -258,7 +273,7 @@ def test_who_may_not(cloud: CloudProcess, someone: Callable[[str], Provider], ca
     assert rosa.far(capsys, "publish", str(heavy)) == 1 and "1048576 are allowed" in rosa.err
     assert rosa.run(capsys, "cloud", "--data", str(cloud.data), "revoke", "rosa") == 0 and "3 revoked" in rosa.out
     until(Refused, 401, lambda: call(cloud, right, "publish_list", {"signed_list": small}))
-    assert rosa.far(capsys, "publish", rapp(tmp_path, "rose", "4.0.0", "'late'\n")) == 1 and "valid Accept-Token" in rosa.err
+    assert rosa.far(capsys, "publish", rapp(tmp_path, "rose", "4.0.0", "'late'\n")) == 1 and "RAPP_TOKEN_FILE" in rosa.err
     assert files(cloud) == before
 
 

@@ -1,6 +1,8 @@
 """Publishers elsewhere: what they hand in is on offer as they have signed it, or nothing has changed."""
 
+import os
 import shutil
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -54,9 +56,9 @@ def hand_in(shelf: Shelf, who: Publisher, data: bytes, signed_list: bytes | None
     return noted
 
 
-def replace(shelf: Shelf, who: Publisher, signed_list: bytes) -> list[tuple[str, str]]:
+def replace(shelf: Shelf, who: Publisher, signed_list: bytes, quota: int = QUOTA) -> list[tuple[str, str]]:
     noted: list[tuple[str, str]] = []
-    shelf.desk.replace(who.name, signed_list, lambda *deed: noted.append(deed))
+    shelf.desk.replace(who.name, signed_list, lambda *deed: noted.append(deed), quota)
     return noted
 
 
@@ -121,7 +123,7 @@ def test_what_is_not_noted_is_not_on_offer(shelf: Shelf, maria: Publisher, tmp_p
     with pytest.raises(Unreachable):
         shelf.desk.publish("maria", maria.file(data), maria.list_with(data), away, QUOTA)
     with pytest.raises(Unreachable):
-        shelf.desk.replace("maria", maria.signed(maria.standing.renewed()), away)
+        shelf.desk.replace("maria", maria.signed(maria.standing.renewed()), away, QUOTA)
     assert state(shelf) == before
 
 
@@ -171,14 +173,21 @@ def test_packages_as_the_store_takes_them_from_nobody(shelf: Shelf, maria: Publi
 
 
 def test_too_much(shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path: Path) -> None:
-    data = package(tmp_path)
-    hand_in(shelf, maria, data, quota=len(data))
-    replace(shelf, maria, maria.signed(maria.standing.without("clock", "1.0.0")))
-    newer = package(tmp_path, version="1.1.0")
-    error = refused(shelf, maria, newer, quota=len(data) + len(newer) - 1)
-    assert f"{len(data) + len(newer) - 1} are allowed" in str(error)
-    assert error.status == 413
-    hand_in(shelf, maria, newer, quota=len(data) + len(newer))
+    data, newer = package(tmp_path), package(tmp_path, version="1.1.0")
+
+    def used() -> int:
+        lists, packages = shelf.metadata.glob("*.maria.json"), shelf.targets.glob("*.clock-*.hz")
+        return sum(path.stat().st_size for path in (*lists, *packages))
+
+    exact = used() + len(data) + len(maria.list_with(data))
+    assert f"{exact - 1} are allowed" in str(refused(shelf, maria, data, quota=exact - 1))
+    hand_in(shelf, maria, data, quota=exact)
+    with pytest.raises(Refused, match=r"cannot take the list: .* ask who keeps the platform"):
+        replace(shelf, maria, maria.signed(maria.standing.renewed()), quota=exact)
+    replace(shelf, maria, maria.signed(maria.standing.without("clock", "1.0.0")), quota=0)
+    exact = used() + len(newer) + len(maria.list_with(newer))
+    assert refused(shelf, maria, newer, quota=exact - 1).status == 413
+    hand_in(shelf, maria, newer, quota=exact)
     small = Desk(shelf._ledger, shelf.targets, Limits(packed=100), shelf.manifests)
     with pytest.raises(Invalid, match="100"):
         small.publish("maria", maria.file(newer), b"", lambda *_: None, QUOTA)
@@ -303,3 +312,43 @@ def test_the_platform_needs_no_key_that_publishes(shelf: Shelf, maria: Publisher
     hand_in(shelf, maria, package(tmp_path))
     shelf.refresh()
     assert offered(robot) == ["1.0.0"]
+
+
+def test_a_list_that_has_expired_is_followed_by_another(
+    shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path: Path
+) -> None:
+    eve = Publisher("eve", shelf, tmp_path)
+    eve.join("parrot")
+    hand_in(shelf, maria, package(tmp_path))
+    gone = maria.standing.renewed()
+    gone.expires = datetime.now(UTC) - timedelta(days=1)
+    lists = shelf._ledger.read()
+    lists.publishers["maria"] = gone
+    shelf._ledger.write(lists, (), {"maria": maria.signed(gone)})
+    with pytest.raises(Untrusted, match="freeze"):
+        offered(robot)
+    assert [standing.publisher for standing in robot.standings()] == ["rapp", "maria", "eve"]
+    path = shelf.metadata / f"{gone.version}.maria.json"
+    right = path.read_bytes()
+    path.write_bytes(right.replace(b'"version":3', b'"version":4'))
+    with pytest.raises(Untrusted):
+        robot.standings("maria")
+    path.write_bytes(right)
+    replace(shelf, maria, maria.signed(maria.standing.renewed()))
+    assert offered(robot) == ["1.0.0"]
+
+
+def test_lists_of_old_go(shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path: Path) -> None:
+    for version in ("1.0.0", "1.1.0"):
+        hand_in(shelf, maria, package(tmp_path, version=version))
+    before = {path.name for path in shelf.metadata.iterdir()}
+    shelf.refresh()
+    assert {path.name for path in shelf.metadata.iterdir()} == before  # robots may still look at them
+    for path in shelf.metadata.iterdir():
+        os.utime(path, times=(0, 0))
+    shelf.refresh()
+    newest = shelf._ledger.read()
+    lists = {"snapshot": newest.snapshot, "targets": newest.targets, **newest.publishers, "root": newest.root}
+    wanted = {f"{one.version}.{name}.json" for name, one in lists.items()}
+    assert {path.name for path in shelf.metadata.iterdir()} == {*wanted, "timestamp.json"}
+    assert offered(robot) == ["1.0.0", "1.1.0"]

@@ -132,6 +132,8 @@ REFUSALS: list[tuple[str, type[HopError], str, Change]] = [
     ("robots that are none", Invalid, "must be a list", only("custom", robots="nao")),
     ("robot that is none", Invalid, "cannot use the name", only("custom", robots=["../nao"])),
     ("robots without number", Invalid, "must be a list", only("custom", robots=["nao"] * 2000)),
+    ("no words of what it is", Invalid, "does not say what it is", lambda own: put(own, wordless())),
+    ("number that is true", Invalid, "another kind", lambda own: setattr(own, "version", True)),
     ("another hash", Invalid, "no other hash", two_hashes),
 ]  # fmt: skip
 
@@ -140,6 +142,12 @@ def moved_name() -> TargetFile:
     """An entry whose path is another's, whatever it says of itself."""
     found = target("clock", "1.2.0")
     found.path = "hello-1.2.0.hz"
+    return found
+
+
+def wordless() -> TargetFile:
+    found = target("clock", "1.2.0")
+    found.unrecognized_fields["custom"] = ["clock", "1.2.0"]
     return found
 
 
@@ -181,6 +189,17 @@ def test_what_is_no_list(standing: Standing) -> None:
             judge(standing, data, NOW)
     with pytest.raises(Invalid, match="at most"):
         judge(standing, right + b" " * MAX_LIST, NOW)
+
+
+def test_nothing_is_around_what_was_signed(standing: Standing) -> None:
+    right = signed(standing.renewed(), MARIA)
+    worded, both = (Metadata.from_bytes(right) for _ in range(2))
+    worded.signatures[MARIA.public_key.keyid].unrecognized_fields["more"] = "x" * 100
+    both.sign(STRANGER, append=True)
+    outside = right.replace(b'{"signatures"', b'{"more":1,"signatures"', 1)
+    for data in (right + b" ", b"\n" + right, right.replace(b",", b" ,", 1), worded.to_bytes(), both.to_bytes(), outside):
+        with pytest.raises(Invalid, match="more in it than was signed"):
+            judge(standing, data, NOW)
 
 
 def test_an_application_is_signed_by_the_key_it_names() -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 import tempfile
+from datetime import UTC, datetime
 from pathlib import Path
 
 from rapp_cli.errors import UsageError
@@ -23,11 +24,12 @@ from rapp_hop.hz.trust import Versions, choose
 
 def list_far(options: argparse.Namespace) -> int:
     """One line per package."""
-    standings = with_store(remote_of(options, token=False), RemoteStore.standings)
+    standings, now = with_store(remote_of(options, token=False), RemoteStore.standings), datetime.now(UTC)
     for standing in standings:
         for path, target in sorted(standing.own.targets.items()):
             name, _, version = path.removesuffix(".hz").partition("-")
-            print(f"{name:<24} {version:<12} {standing.publisher:<12} {target.length:>9} bytes")
+            late = "" if standing.own.expires > now else f"  expired, {standing.publisher} must run ./rapp store renew"
+            print(f"{name:<24} {version:<12} {standing.publisher:<12} {target.length:>9} bytes{late}")
     return 0
 
 
@@ -38,7 +40,8 @@ def show_far(options: argparse.Namespace) -> int:
     async def look(store: RemoteStore) -> tuple[Manifest, str, Versions]:
         offered = await store.versions(name)
         if not offered.releases:
-            raise UsageError(f"cannot show {name}: it is not in the store, see ./rapp store list")
+            what = f"its versions are yanked ({', '.join(sorted(offered.yanked))})" if offered.yanked else "it is not in the store"
+            raise UsageError(f"cannot show {name}: {what}, see ./rapp store list")
         owners = [one.publisher for one in await store.standings() if name in _names(one)]
         with tempfile.TemporaryDirectory() as folder:
             package = Path(folder, "package")

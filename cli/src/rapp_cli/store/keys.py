@@ -7,6 +7,7 @@ from rapp_cli.errors import UsageError
 from rapp_cli.store.own_key import add_own_options, make_own
 from rapp_cli.store.place import add_store_options, keys_of, store_of, told
 from rapp_cloud.keys import ROOTS
+from rapp_hop.errors import Invalid
 from rapp_hop.hz.application import Application, read_application
 
 _DONE = {"new": "may publish", "grant": "has the names", "rotate": "has a new key", "revoke": "has no key any more"}
@@ -72,7 +73,10 @@ def run(options: argparse.Namespace) -> int:
 def _application(options: argparse.Namespace) -> Application | None:
     if options.public is None:
         return None
-    application = read_application(options.public.read_bytes())
+    try:
+        application = read_application(options.public.read_bytes())
+    except Invalid as error:
+        raise UsageError(f"{error}: {options.public} must be what ./rapp keys own has made") from None
     if application.publisher != options.name:
         raise UsageError(f"cannot take the key for {options.name}: {options.public} is {application.publisher}'s")
     return application

@@ -39,9 +39,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Publish; raises UsageError naming what must change first."""
     packages = [_built(folder) for folder in parts(options.folder)]
-    done = _publish_far(options, packages) if options.cloud else _publish_here(options, packages)
-    for manifest, package in packages:
-        print(f"{done}: {manifest.name} {manifest.version}, {len(package)} bytes")
+    (_publish_far if options.cloud else _publish_here)(options, packages)
     return 0
 
 
@@ -54,31 +52,43 @@ def _built(folder: Path) -> tuple[Manifest, bytes]:
     return manifest, package
 
 
-def _publish_here(options: argparse.Namespace, packages: list[tuple[Manifest, bytes]]) -> str:
+def _publish_here(options: argparse.Namespace, packages: list[tuple[Manifest, bytes]]) -> None:
     shelf = store_of(options)
     if options.check:
-        for manifest, _ in packages:
-            check_publication(manifest, [offer.manifest for offer in shelf.offers()])
-        return "can be published"
+        offered = [offer.manifest for offer in shelf.offers()]
+        for manifest, package in packages:
+            check_publication(manifest, offered)
+            offered.append(manifest)
+            _tell("can be published", manifest, package)
+        return
     with noting(options, shelf):
-        for _, package in packages:
+        for manifest, package in packages:
             shelf.publish(package, options.publisher, tuple(options.only), check_publication)
-    return "on offer"
+            _tell("on offer", manifest, package)
 
 
-def _publish_far(options: argparse.Namespace, packages: list[tuple[Manifest, bytes]]) -> str:
+def _publish_far(options: argparse.Namespace, packages: list[tuple[Manifest, bytes]]) -> None:
     remote, ring = remote_of(options), ring_of(folder_of(options))
     publisher = publisher_of(ring, options.publisher)
+    to_come: set[str | None] = set()  # packages of this RApp that are not on offer after a mere check
 
     async def publish(store: RemoteStore) -> None:
         for manifest, package in packages:
             standing = await store.standing(publisher)
             follows = standing.with_package(manifest, package, tuple(options.only))
+            if manifest.partner in to_come:
+                _tell(f"the platform cannot check it before {manifest.partner} is on offer", manifest, package)
+                continue
             if follows is not None:
                 await store.publish(package, signed(follows, signer_of(ring, standing)), check=options.check)
+                to_come.update({manifest.name} if options.check else ())
+            _tell("can be published" if options.check else "on offer", manifest, package)
 
     with_store(remote, publish)
-    return "can be published" if options.check else "on offer"
+
+
+def _tell(done: str, manifest: Manifest, package: bytes) -> None:
+    print(f"{done}: {manifest.name} {manifest.version}, {len(package)} bytes")
 
 
 def parts(folder: Path) -> list[Path]:

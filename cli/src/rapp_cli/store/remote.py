@@ -7,7 +7,9 @@ rollback). The platform gives them a token and its root; a token is never a word
 import argparse
 import asyncio
 import hashlib
+import logging
 import os
+import ssl
 import tempfile
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
@@ -16,6 +18,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from securesystemslib.signer import CryptoSigner
+from tuf.api.metadata import Metadata, Root  # type: ignore[attr-defined]  # public, but not in __all__
+from tuf.api.serialization import DeserializationError
 
 from rapp_cli.cloud import check_url
 from rapp_cli.errors import UsageError
@@ -30,6 +34,8 @@ from rapp_hop.hz.trust import Release, TrustedStore, Versions
 PATIENCE = 60.0  # s for a list
 PUBLISHING = 300.0  # s for a package
 MAX_TOKEN = 300  # bytes of its file
+MAX_ROOT = 512_000  # bytes, as TUF's clients have it
+UNAUTHORIZED = 401  # HTTP status
 NEXT = "next_"  # begin of the name of a key that the store does not know yet
 T = TypeVar("T")
 
@@ -92,7 +98,13 @@ class RemoteStore:
             files = {name: Path(folder, name) for name in contents}
             for name, path in files.items():
                 path.write_bytes(contents[name])
-            await self._client.call(service, arguments, files, timeout)
+            try:
+                await self._client.call(service, arguments, files, timeout)
+            except Refused as error:
+                if error.status != UNAUTHORIZED:
+                    raise
+                ask = "ask who keeps the platform for another (./rapp cloud token NAME FILE)"
+                raise Refused(f"cannot hand in: the platform does not take the token of RAPP_TOKEN_FILE, {ask}") from None
 
 
 def add_cloud_option(parser: argparse.ArgumentParser) -> None:
@@ -111,8 +123,10 @@ def remote_of(options: argparse.Namespace, environment: Mapping[str, str] = os.e
         if name not in files:
             raise UsageError(f"cannot use {url} without {name}: set it to the file that the platform's owner gave")
     ca_file = Path(environment["RAPP_CLOUD_CA_FILE"]).expanduser() if environment.get("RAPP_CLOUD_CA_FILE") else None
+    if ca_file is not None:
+        _check_certificate(ca_file)
     secret = _token(files["RAPP_TOKEN_FILE"]) if token else None
-    return Remote(url, files["RAPP_ROOT_FILE"].read_bytes(), secret, ca_file, folder_of(options))
+    return Remote(url, _root(files["RAPP_ROOT_FILE"]), secret, ca_file, folder_of(options))
 
 
 def folder_of(options: argparse.Namespace) -> Path:
@@ -158,6 +172,7 @@ def with_store(remote: Remote, work: Callable[[RemoteStore], Coroutine[Any, Any,
         async with _connected(remote) as store:
             return await work(store)
 
+    logging.getLogger("tornado.general").setLevel(logging.ERROR)  # what it warns of, our own errors say
     return asyncio.run(connected())
 
 
@@ -173,5 +188,27 @@ async def _connected(remote: Remote) -> AsyncIterator[RemoteStore]:
 def _token(path: Path) -> str:
     if path.stat().st_mode & 0o077:
         raise UsageError(f"cannot use {path}: others can read it, set its mode to 0600")
-    with path.open() as file:
-        return file.read(MAX_TOKEN).strip()
+    with path.open("rb") as file:
+        text = file.read(MAX_TOKEN).strip().decode(errors="replace")
+    if not (text.isascii() and text.isprintable() and text):
+        raise UsageError(f"cannot use {path}: it holds no token, name the right file in RAPP_TOKEN_FILE")
+    return text
+
+
+def _root(path: Path) -> bytes:
+    with path.open("rb") as file:
+        data = file.read(MAX_ROOT)
+    try:
+        Metadata[Root].from_bytes(data)
+    except DeserializationError:
+        raise UsageError(f"cannot use {path}: it is no root.json of a store, name the right file in RAPP_ROOT_FILE") from None
+    return data
+
+
+def _check_certificate(path: Path) -> None:
+    try:
+        ssl.create_default_context(cafile=path)
+    except ssl.SSLError:
+        raise UsageError(f"cannot use {path}: it is no certificate, name the right file in RAPP_CLOUD_CA_FILE") from None
+    except OSError as error:
+        raise UsageError(f"cannot use {path}: {error.strerror}, name the right file in RAPP_CLOUD_CA_FILE") from None

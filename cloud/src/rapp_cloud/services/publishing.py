@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 def publishing_services(desk: Desk, accounts: Accounts, audit: Audit, quota: int) -> list[Service]:
     """Make the services.
 
-    :param quota: bytes of all packages of one publisher
+    :param quota: bytes of all packages and lists of one publisher
     """
     tries = Fairness(RATE, BURST, time.monotonic)
 
@@ -52,7 +52,7 @@ def publishing_services(desk: Desk, accounts: Accounts, audit: Audit, quota: int
         """Take packages off offer, or keep them on it for longer, by their publisher's signed list."""
         note = admitted(request)
         with _disk():
-            change = desk.replace(request.caller, _read(signed_list), note)
+            change = desk.replace(request.caller, _read(signed_list), note, quota)
         return {"number": change.own.version, "withdrawn": list(change.withdrawn)}
 
     return [publish_package, publish_list]

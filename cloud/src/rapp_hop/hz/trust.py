@@ -22,7 +22,7 @@ from typing import IO, Any, Protocol
 from urllib.parse import quote
 
 from tuf.api import exceptions as tuf
-from tuf.api.metadata import Metadata, TargetFile, Targets, Timestamp  # type: ignore[attr-defined]  # public, but not in __all__
+from tuf.api.metadata import Metadata, Snapshot, TargetFile, Targets, Timestamp  # type: ignore[attr-defined]  # public, but not in __all__
 from tuf.ngclient.config import UpdaterConfig
 from tuf.ngclient.fetcher import FetcherInterface
 from tuf.ngclient.updater import Updater
@@ -108,7 +108,7 @@ class TrustedStore:
             return Versions(tuple(sorted(releases, key=lambda item: item.version.key)), frozenset(yanked))
 
     def standings(self, publisher: str | None = None) -> list[Standing]:
-        """Refresh the metadata and return how publishers stand who have a name, all lists verified.
+        """Refresh the metadata and return how publishers stand who have a name, all lists verified; lists may have expired.
 
         :param publisher: only this one; None: all
         :raises Untrusted: naming the attack
@@ -118,7 +118,7 @@ class TrustedStore:
             targets = self._cached("targets", Targets)
             roles = (targets.delegations.roles or {}) if targets.delegations else {}
             named = [(name, role.paths[0]) for name, role in roles.items() if role.paths and publisher in (None, name)]
-            return [Standing(name, targets, self._lists(updater, path.replace("*", "0"))[-1]) for name, path in named]
+            return [Standing(name, targets, self._newest(updater, targets, name, path.replace("*", "0"))) for name, path in named]
 
     def download(self, release: Release, destination: Path, on_progress: Progress | None = None) -> None:
         """Write the package of `release` to `destination`, verified as a whole; nothing is left when it is wrong.
@@ -181,6 +181,19 @@ class TrustedStore:
             if terminating:
                 break
         return found
+
+    def _newest(self, updater: Updater, targets: Targets, publisher: str, path: str) -> Targets:
+        """Return a publisher's list, verified, also one that has expired: without it they could not sign the next one."""
+        try:
+            return self._lists(updater, path)[-1]
+        except tuf.ExpiredMetadataError:
+            meta = self._cached("snapshot", Snapshot).meta[f"{publisher}.json"]
+            url = f"{self._url}/metadata/{meta.version}.{publisher}.json"
+            data = self._fetcher.download_bytes(url, meta.length or updater.config.targets_max_length)
+            meta.verify_length_and_hashes(data)
+            metadata = Metadata[Targets].from_bytes(data)
+            targets.verify_delegate(publisher, metadata.signed_bytes, metadata.signatures)
+            return metadata.signed
 
     def _check_clock(self) -> None:
         """Without a right clock no expiry means anything."""
