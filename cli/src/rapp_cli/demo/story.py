@@ -24,14 +24,17 @@ class Story(Protocol):
         """Tell what was left, on the terminal; gives the exit status. With a real robot, `live` has not been called."""
 
 
-async def ask(person: Person, command: str, timeline: Timeline) -> int:
-    """Ask for a RApp; gives the index behind its start in the timeline. Raises CommandError when it is never understood."""
+async def ask(person: Person, command: str, timeline: Timeline, until: str = "s9") -> int:
+    """Ask for a RApp until the core agent enters a state; gives the index behind that in the timeline.
+
+    Raises CommandError when it never does.
+    """
     listening = await timeline.wait_for("core", "entered", "s3")
     for _ in range(ASKS):
         await asyncio.sleep(THINKING)
         await person.say(command)
         try:
-            return await asyncio.wait_for(timeline.wait_for("core", "entered", "s9", listening), PATIENCE)
+            return await asyncio.wait_for(timeline.wait_for("core", "entered", until, listening), PATIENCE)
         except TimeoutError:
             continue
     raise CommandError(f"cannot get the robot to start a RApp for “{command}”; see the timeline above")

@@ -17,7 +17,7 @@ from rapp_cli.timeline import Entry, Timeline, follow
 from rapp_hop.hz.archive import build, inspect
 from rapp_hop.hz.manifest import Manifest
 
-CORE, RAPP = "core", "dynamic"
+CORE = "core"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -55,24 +55,26 @@ async def _try(config: demo.DemoConfig, folders: list[Path], answers: list[str])
         following = asyncio.create_task(_show(system, timeline))
         try:
             async with asyncio.timeout(config.timeout):
-                return await _once(config, system, timeline, answers)
+                entries = await _once(config, system, timeline, answers)
         except TimeoutError:
             raise CommandError(f"cannot finish within {config.timeout:.0f} s; the logs are in {system.logs}") from None
         finally:
             following.cancel()
+    return _judge(entries, config.folder / "robot" / "logs")
 
 
-async def _once(config: demo.DemoConfig, system: System, timeline: Timeline, answers: list[str]) -> int:
+async def _once(config: demo.DemoConfig, system: System, timeline: Timeline, answers: list[str]) -> list[Entry]:
+    """What happens from the robot's hearing the keyword until it listens again."""
     person = Person(system.robot, config.voice)
     await person.enter()
     answering = asyncio.create_task(_answer(person, list(answers)))
     try:
-        started = await ask(person, config.command, timeline)
-        await timeline.wait_for(CORE, "entered", "s3", started)
+        heard = await ask(person, config.command, timeline, until="s4")
+        await timeline.wait_for(CORE, "entered", "s3", heard)
     finally:
         answering.cancel()
         await person.leave()
-    return _judge(timeline.entries[started:])
+    return timeline.entries[heard:]
 
 
 async def _answer(person: Person, answers: list[str]) -> None:
@@ -81,10 +83,13 @@ async def _answer(person: Person, answers: list[str]) -> None:
         await person.say(text)
 
 
-def _judge(entries: list[Entry]) -> int:
-    failed = [entry for entry in entries if entry.kind == "failed"]
+def _judge(entries: list[Entry], logs: Path) -> int:
+    """Its own failure comes first; a RApp that cannot tell of it, as one that is killed, is known by the robot's apology."""
+    failed = [entry for entry in entries if entry.kind == "failed"] or [
+        entry for entry in entries if (entry.agent, entry.kind, entry.state) == (CORE, "said", "s11")
+    ]
     if failed:
-        print(f"rapp run: FAILED in {failed[0].state}: {failed[0].detail}", flush=True)
+        print(f"rapp run: FAILED in {failed[0].state}: {failed[0].detail}; what it wrote is in {logs}", flush=True)
         return 1
     print("rapp run: it has ended well", flush=True)
     return 0
