@@ -45,6 +45,7 @@ class Desk:
         :param check: only judge, change nothing
         :raises HopError: see `judge` and `check_publication`; also when the package is not the one of the list
         """
+        judge(standing_of(self._ledger.read(), publisher), data, datetime.now(UTC))  # who has no key causes no work
         manifest, length, digest = self._seen(package)
         path = package_file_name(manifest.name, manifest.version.text)
         with self._ledger.locked():

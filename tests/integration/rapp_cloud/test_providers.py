@@ -174,6 +174,7 @@ def test_a_new_key_at_home(cloud: CloudProcess, someone: Callable[[str], Provide
     assert nina.far(capsys, "publish", source) == 1 and "the store knows no key" in nina.err
     assert "note" not in listed(cloud)
     words = ("keys", "own", "nina", "--home", str(nina.home), "-o", str(nina.file), "--anew")
+    assert nina.run(capsys, *words, "--after", "-1") == 2 and "cannot follow list -1" in nina.err
     assert nina.run(capsys, *words) == 0
     assert nina.owner(capsys, "keys", "new", "nina", "--public", str(nina.file)) == 1 and "--after 5" in nina.err
     assert nina.run(capsys, *words, "--after", "5") == 0

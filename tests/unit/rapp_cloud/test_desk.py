@@ -17,6 +17,7 @@ from rapp_cloud.shelf import Shelf
 from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
 from rapp_hop.hz.application import first_list
 from rapp_hop.hz.archive import build, inspect
+from rapp_hop.hz.standing import signed
 from rapp_hop.hz.tar import Limits
 from rapp_hop.hz.trust import Attack, TrustedStore, Untrusted, Versions
 
@@ -174,6 +175,7 @@ def test_packages_as_the_store_takes_them_from_nobody(shelf: Shelf, maria: Publi
 
 def test_too_much(shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path: Path) -> None:
     data, newer = package(tmp_path), package(tmp_path, version="1.1.0")
+    free = (lambda *_: None, QUOTA)
 
     def used() -> int:
         lists, packages = shelf.metadata.glob("*.maria.json"), shelf.targets.glob("*.clock-*.hz")
@@ -189,8 +191,11 @@ def test_too_much(shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path:
     assert refused(shelf, maria, newer, quota=exact - 1).status == 413
     hand_in(shelf, maria, newer, quota=exact)
     small = Desk(shelf._ledger, shelf.targets, Limits(packed=100), shelf.manifests)
+    with pytest.raises(Refused, match="not signed by maria's key"):  # before anybody looks at the package
+        small.publish("maria", maria.file(newer), signed(maria.standing.renewed(), CryptoSigner.generate_ed25519()), *free)
+    newest = package(tmp_path, version="1.2.0")
     with pytest.raises(Invalid, match="100"):
-        small.publish("maria", maria.file(newer), b"", lambda *_: None, QUOTA)
+        small.publish("maria", maria.file(newest), maria.list_with(newest), *free)
 
 
 def test_one_cannot_touch_what_is_anothers(shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path: Path) -> None:

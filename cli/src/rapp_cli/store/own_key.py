@@ -36,6 +36,8 @@ def make_own(options: argparse.Namespace) -> int:
     path: Path = options.output or Path(f"{name}.publisher")
     if name.startswith(NEXT):
         raise UsageError(f"cannot make a key for {name}: choose a name that does not begin with {NEXT}")
+    if options.after < 0:
+        raise UsageError(f"cannot follow list {options.after}: give the number that the platform's owner was told")
     if options.cloud:
         data, action = _to_follow(options, ring, name), "rotate"
     else:
