@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _line(run: dict[str, Any]) -> str:
     when = datetime.fromtimestamp(_number(run.get("began")) or run["received"]).astimezone()
-    errors = "; ".join(_text(error, "detail") for error in _list(run, "errors"))
+    errors = "; ".join(dict.fromkeys(_text(error, "detail") for error in _list(run, "errors")))  # each state may tell of the same
     what = f"{_text(run, 'rapp')} {_text(run, 'version')}"
     took = f"{_number(run.get('seconds')):7.1f} s  {_text(run, 'run')}"
     return f"{when:%F %T} {run['robot']:<12} {what:<28} {_text(run, 'outcome'):<7} {took}  {errors}".rstrip()

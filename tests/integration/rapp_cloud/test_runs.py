@@ -28,7 +28,7 @@ FAILED = {
     "run": "r-2",
     "rapp": EVIL,
     "outcome": "failed",
-    "errors": [{"agent": "dynamic", "state": "s3", "detail": EVIL + "\x1b[2J"}],
+    "errors": [{"agent": "dynamic", "state": state, "detail": EVIL + "\x1b[2J"} for state in ("s31", "s3")],
 }
 ODD = {"run": "r-3", "began": "x", "seconds": 1e300, "states": "x", "errors": [3, {}], "rapp": ["x"]}
 
@@ -101,6 +101,7 @@ def test_rapp_runs(cloud: CloudProcess, capsys: pytest.CaptureFixture[str]) -> N
     lines = shown.splitlines()
     assert len(lines) == 4
     assert "\x1b" not in shown
+    assert shown.count("?[2J") == 1  # told by two states
     assert "voice_mail 1.2.0" in lines[2] and "done" in lines[2] and "12.2 s" in lines[2]
     assert rapp(["runs", "--data", str(cloud.data), "--robot", "nao", "--json"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["states"] == DONE["states"]
