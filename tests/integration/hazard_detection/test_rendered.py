@@ -6,6 +6,7 @@ from its start, and that is not exact.
 
 import asyncio
 import math
+import tempfile
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,12 @@ PROFILE = {"name": "Maria", "contacts": [{"name": "Elizabeth", "address": "eliza
 PLAN = rooms.load()
 STARTS = {"home": Pose(PLAN.robot.x, PLAN.robot.y, PLAN.robot.theta)} | {s.name: Pose(s.x, s.y, s.theta) for s in PLAN.starts}
 ANGLES = range(0, 91, 10)
+
+
+@pytest.fixture(autouse=True)
+def own_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The RApp leaves its pictures in the temporary folder, which is its run's own only when it is confined."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
 @pytest.fixture(scope="module")

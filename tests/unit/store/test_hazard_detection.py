@@ -4,6 +4,7 @@ import asyncio
 import importlib.util
 import json
 import math
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,12 @@ SAFE = {
 }
 OPEN = {**SAFE, "door": {"sure": True, "hazard": True, "words": "the door is open by about 40 degrees"}}
 UNSURE = {**SAFE, "door": {"sure": False, "hazard": None, "words": "I am not sure about the door"}}
+
+
+@pytest.fixture(autouse=True)
+def own_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The RApp leaves its pictures in the temporary folder, which is its run's own only when it is confined."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
 def seen(*names: str) -> dict[str, Any]:
