@@ -105,8 +105,9 @@ def test_from_an_authors_desk_to_a_robot(
     assert maria.far(capsys, "publish", source) == 1 and "./rapp keys grant maria clock" in maria.err
     assert maria.owner(capsys, "keys", "grant", "maria", "clock") == 0
     assert maria.far(capsys, "publish", source, "--check") == 0 and "can be published: clock 1.0.0" in maria.out
-    assert "clock" not in listed(cloud)
+    assert "every minute" not in maria.err and "clock" not in listed(cloud)
     assert maria.far(capsys, "publish", source) == 0 and "on offer: clock 1.0.0" in maria.out
+    assert "robots look at what is on offer every minute" in maria.err
     assert listed(cloud)["clock"] == "1.0.0"
     assert '<article id="clock">' in page(cloud) and "<dt>Signed by</dt><dd>maria</dd>" in page(cloud)
     assert installed(cloud, tmp_path / "robot", "clock") == "1.0.0"

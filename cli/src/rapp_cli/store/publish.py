@@ -2,6 +2,7 @@
 
 import argparse
 import io
+import sys
 from pathlib import Path
 
 from rapp_cli.errors import UsageError
@@ -40,6 +41,8 @@ def run(options: argparse.Namespace) -> int:
     """Publish; raises UsageError naming what must change first."""
     packages = [_built(folder) for folder in parts(options.folder)]
     (_publish_far if options.cloud else _publish_here)(options, packages)
+    if not options.check:
+        print("rapp publish: robots look at what is on offer every minute; then ask for it", file=sys.stderr)
     return 0
 
 
