@@ -83,8 +83,11 @@ def test_what_package_json_does_not_name_is_refused(workshop, core):
     """By rapp_api, and by the protocol: a core service, one of the robot's own, rosapi, and what only looks like it."""
     body = """
 const names = ["rapp_rest", "/rapp_hop/secret", "/rosapi/topics", "rosapi/nodes", "/core_agent/get_loggers"];
+let where;
+try { await navigation.rest(); } catch (error) { where = error.stack; }
 facts = {
   said: await attempt(() => navigation.rest()),
+  where,
   off: [await attempt(() => communication.textToSpeech()), await attempt(() => communication.textToSpeech(["a"]))],
   asked: await Promise.all(names.map((name) => ask(name))),
 };
@@ -92,6 +95,7 @@ facts = {
     facts, _, _ = told(workshop, body)
     refusal = "cannot call /rapp_rest: the RApp's package.json does not name it under permissions.core"
     assert facts["said"] == ["Refused", refusal]
+    assert "/agent.js:" in facts["where"]
     assert [name for name, _ in facts["off"]] == ["Invalid", "Invalid"]
     assert [answer["result"] for answer in facts["asked"]] == [False] * len(facts["asked"])
     assert core.notes("rapp_hop/secret") == core.notes("rapp_rest") == []

@@ -12,6 +12,7 @@ import pytest
 from fakes.link import FakeLink
 from rapp_core.control import run_reports
 from rapp_core.control.run_reports import FOLDER, KEPT, RunReports
+from rapp_core.control.stopping import BY_PERSON
 from rapp_core.errors import Invalid, Refused
 from rapp_core.trace import Happening, Trace
 
@@ -103,6 +104,21 @@ def test_what_failed_is_in_it(tmp_path: Path) -> None:
     bench.reports.close()
     assert report["outcome"] == "failed"
     assert [error["detail"] for error in report["errors"]] == ["ValueError", "It has failed", "ValueError: no"]
+
+
+def test_what_the_person_has_stopped_has_not_failed(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.agents.run.outcome = ("failed", "Refused: cannot say: its lease has ended")
+    bench.reports.activate(tmp_path / "rapps" / "hello" / "1.0.0", lambda _message: None)
+    bench.trace.tell(Happening("dynamic", "dynamic", "s3", "failed", "an error before"))
+    bench.trace.note(BY_PERSON)
+    bench.trace.tell(Happening("dynamic", "dynamic", "s3", "failed", "Refused"))
+    bench.trace.tell(Happening("core", "core", "s11", "said", "You have stopped it"))
+    bench.enter("core", "s3")
+    (report,) = bench.sent(1)
+    bench.reports.close()
+    assert report["outcome"] == "stopped"
+    assert [error["detail"] for error in report["errors"]] == ["an error before"]
 
 
 def test_one_that_could_not_start_is_reported_too(tmp_path: Path) -> None:

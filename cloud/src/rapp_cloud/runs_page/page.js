@@ -23,7 +23,7 @@ function shown(run) {
   const title = make("summary", {}, make("b", { textContent: `${run.rapp || "?"} ${run.version || ""}` }), " ",
     `${run.outcome || ""}, ${seconds(run.seconds)}, ${run.robot}, ${when}`);
   const errors = list(run.errors).map((one) => make("li", { textContent: `${one.agent} ${one.state}: ${one.detail}` }));
-  const part = make("details", { className: run.outcome === "done" ? "" : "failed" }, title, make("ul", {}, ...errors), statesOf(run));
+  const part = make("details", { className: run.outcome === "failed" ? "failed" : "" }, title, make("ul", {}, ...errors), statesOf(run));
   part.dataset.run = run.run;
   return part;
 }

@@ -18,11 +18,20 @@ async function call(service, fields) {
   if (asking === null) {
     throw new Bug("cannot reach a core agent: this program was not started by one; give core.use a double to try it by itself");
   }
-  const response = await asking(service, fields);
+  const response = await asked(service, fields);
   if (!response.success) {
     throw new (KINDS[response.error] ?? Refused)(response.message);
   }
   return response;
+}
+
+async function asked(service, fields) {
+  try {
+    return await asking(service, fields);
+  } catch (error) {
+    Error.captureStackTrace(error, asked); // the RApp's line, not where the answer came in
+    throw error;
+  }
 }
 
 /** The error that rosbridge's text for a call that failed means. */

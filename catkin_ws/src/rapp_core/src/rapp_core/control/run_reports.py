@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rapp_core.control.stopping import BY_PERSON
 from rapp_core.errors import CoreError, Unreachable
 from rapp_core.manifest import Manifest
 from rapp_core.ports import Agent, Agents, Hop, Told
@@ -40,6 +41,7 @@ class _Run:
     states: list[dict[str, Any]] = field(default_factory=list)
     open: dict[str, tuple[dict[str, Any], float]] = field(default_factory=dict)  # by FSM: its state's entry, and since when
     errors: list[dict[str, str]] = field(default_factory=list)
+    stopped: bool = False  # by the person: what fails from then on is no error
 
 
 class RunReports:
@@ -96,6 +98,8 @@ class RunReports:
             self._end()
         elif seen.kind == "entered" and (seen.agent == "dynamic" or seen.machine == "core"):
             self._enter(seen)
+        elif seen.kind == "message" and seen.detail == f"core: {BY_PERSON}":
+            self._stopped()
         elif seen.kind == "failed":
             self._fail(seen.agent, seen.state, seen.detail)
         elif seen.kind == "said" and seen.state == "s11":
@@ -120,9 +124,14 @@ class RunReports:
             run.states.append(entry)
             run.open[machine] = entry, at
 
+    def _stopped(self) -> None:
+        with self._lock:
+            if self._run is not None:
+                self._run.stopped = True
+
     def _fail(self, agent: str, state: str, detail: str) -> None:
         with self._lock:
-            if self._run is not None and len(self._run.errors) < ERRORS:
+            if self._run is not None and not self._run.stopped and len(self._run.errors) < ERRORS:
                 self._run.errors.append({"agent": agent, "state": state, "detail": detail[:TEXT]})
 
     def _end(self) -> None:
@@ -141,11 +150,12 @@ class RunReports:
     def _report(self, run: _Run) -> dict[str, Any]:
         outcome = run.agent.outcome if run.agent is not None else None
         errors = list(run.errors)
-        if outcome is not None and outcome[0] != "done":
+        done = outcome is not None and outcome[0] == "done"
+        if outcome is not None and not done and not run.stopped:
             errors.append({"agent": "dynamic", "state": "", "detail": outcome[1][:TEXT]})
         return {
             "run": run.agent.name if run.agent is not None else secrets.token_hex(6), "rapp": run.rapp, "version": run.version,
-            "outcome": "done" if outcome is not None and outcome[0] == "done" else "failed",
+            "outcome": "done" if done else "stopped" if run.stopped else "failed",
             "began": round(run.wall, 3), "seconds": round(self._now() - run.began, 3),
             "states": run.states, "errors": errors, "versions": self._versions,
         }  # fmt: skip

@@ -55,7 +55,7 @@ class Stopping:
             try:
                 attends = attends or self._attend(call, over)
                 if self._robot.feeling.touched():
-                    call.end(BY_PERSON)
+                    self._end(call)
                     self._robot.voice.hush()
                     return
             except CoreError as error:
@@ -78,4 +78,8 @@ class Stopping:
     def _called(self, call: Call, word: str) -> None:
         if not call.ended:
             self._trace.heard(word)
-            call.end(BY_PERSON)
+            self._end(call)
+
+    def _end(self, call: Call) -> None:
+        self._trace.note(BY_PERSON)
+        call.end(BY_PERSON)
