@@ -54,6 +54,8 @@ def _edit(memory: Memory, words: Words) -> str:
 
 def _show(memory: Memory, words: Words) -> str:
     known: list[tuple[Person, list[str]]] = memory.people.list()
+    if not known:
+        return "nobody is here yet: person add takes somebody in"
     if words.person is None:
         return "\n".join(f"{_line(one.person, one.profile):<50} {' '.join(robots)}".rstrip() for one, robots in known)
     for one, robots in known:
@@ -92,8 +94,9 @@ def _forget(memory: Memory, words: Words) -> str:
 
 
 def _serve(memory: Memory, words: Words) -> str:
-    memory.people.serve(words.robot, words.persons)
-    return f"{words.robot} serves {', '.join(words.persons) or 'nobody'}"
+    persons = list(dict.fromkeys(words.persons))
+    memory.people.serve(words.robot, persons)
+    return f"{words.robot} serves {', '.join(persons) or 'nobody'}"
 
 
 def _line(person: str, profile: Profile) -> str:

@@ -195,7 +195,7 @@ def test_a_rapp_gets_the_persons_of_its_robot(tmp_path: Path, capsys: pytest.Cap
         cloud.run(test)
         shown = person("show", "maria")
         assert "served by nao" in shown and "elizabeth@home.example" in shown
-        person("serve", "nao", "jan")
+        assert person("serve", "nao", "jan", "jan").strip() == "nao serves jan"
         person("edit", "jan", "--language", "pl")
         person("forget", "maria", "Elizabeth")
         person("remove", "maria")
