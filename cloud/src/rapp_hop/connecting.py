@@ -28,7 +28,10 @@ BY_STATUS: dict[int, type[HopError]] = {
 _DISTRUST = {
     9: "its certificate is not good yet; set this computer's clock, or wait",
     10: "its certificate has expired; who runs it must renew it (or this computer's clock is wrong)",
-    **dict.fromkeys((18, 19, 20, 21), "nobody whom this computer trusts vouches for its certificate; name the file of who does (RAPP_CLOUD_CA_FILE)"),
+    **dict.fromkeys(
+        (18, 19, 20, 21),
+        "nobody whom this computer trusts vouches for its certificate; name the file of who does (RAPP_CLOUD_CA_FILE)",
+    ),
     **dict.fromkeys((62, 64), "its certificate is for another name; call it by that, or have the certificate made for this one"),
 }
 """By OpenSSL's X509_V_ERR_…"""
