@@ -51,4 +51,3 @@ def test_dot_draws_sub_fsms_as_double_circles() -> None:
     assert '    "s5" [shape=circle, label="s5", style="bold"];' in lines
     assert '    "s4" [shape=circle, label="s4", style="dashed"];' in lines
     assert '    "s1" -> "s3" [label="when open"];' in lines
-
