@@ -17,7 +17,7 @@ from rapp_cloud.ledger import Ledger, Lists
 from rapp_cloud.publishing import check_publication
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.archive import inspect, package_file_name
-from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.manifest import Manifest, check_numbers
 from rapp_hop.hz.standing import Standing, custom_of
 from rapp_hop.hz.tar import Limits
 
@@ -93,6 +93,7 @@ class Desk:
             contents = inspect(file, self._limits)
             file.seek(0)
             digest = hashlib.file_digest(file, "sha256").hexdigest()
+        check_numbers(contents.manifest)
         if not contents.for_hop:
             raise Invalid(f"cannot publish {contents.manifest.name}: it has no etc/weblet.info, build it with ./rapp hz build")
         return contents.manifest, package.stat().st_size, digest

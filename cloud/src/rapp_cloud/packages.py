@@ -6,7 +6,8 @@ those of when it was read and verified; robots verify what they get in any case.
 
 import logging
 import os
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -25,7 +26,8 @@ from rapp_hop.hz.tar import Limits
 _SPARE = 1000  # lines that count no more, beside as many as count, until the index is written anew
 _log = logging.getLogger(__name__)
 
-_FIELDS = {field.name for field in fields(Manifest)}
+_FIELDS = tuple(f"{kind.__name__}.{field.name}" for kind in (Manifest, Permissions, Needs) for field in fields(kind))
+_FORMAT = zlib.crc32(" ".join(_FIELDS).encode())  # of a line: another one was written by another version of the platform
 
 _Line = tuple[int, int, Any]  # size in bytes, time of the last change in ns, the manifest's fields
 
@@ -68,7 +70,9 @@ class PackageFiles:
             return
         lines, self._new = self._new, {}
         # A line end first: what a cut-off writer has left must not spoil the next line.
-        data = b"".join(b"\n" + orjson.dumps([name, *line]) for name, line in lines.items()) + b"\n"
+        data = b"\n" + _written(lines)
+        if not data.strip():
+            return
         try:
             self._path.parent.mkdir(mode=0o700, exist_ok=True)
             handle = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
@@ -109,17 +113,18 @@ class PackageFiles:
         for line in data.splitlines():
             count += bool(line)
             try:
-                name, size, time, manifest = orjson.loads(line)
-            except ValueError:
+                version, name, size, time, manifest = orjson.loads(line)
+            except (ValueError, TypeError):
                 continue
-            found[str(name)] = (size, time, manifest)
+            if version == _FORMAT:
+                found[str(name)] = (size, time, manifest)
         if count > 2 * len(found) + _SPARE:
             self._write_anew(found)
         return found
 
     def _write_anew(self, lines: dict[str, _Line]) -> None:
         try:
-            write_whole(self._path, b"".join(orjson.dumps([name, *line]) + b"\n" for name, line in lines.items()), mode=0o600)
+            write_whole(self._path, _written(lines), mode=0o600)
         except OSError as error:
             _log.warning("%s cannot be written: %s", self._path, error.strerror)
 
@@ -128,10 +133,19 @@ def _name(target: Any) -> str:
     return f"{target.hashes['sha256']}.{target.path}"
 
 
+def _written(lines: Mapping[str, _Line]) -> bytes:
+    """Return lines as they stand in the index; what cannot be written there is read from its package each time."""
+    pieces = []
+    for name, line in lines.items():
+        try:
+            pieces.append(orjson.dumps([_FORMAT, name, *line]) + b"\n")
+        except TypeError as error:  # an integer of more than 64 bits, which packages might have before they were checked for it
+            _log.warning("%s is left out of the index: %s", name, error)
+    return b"".join(pieces)
+
+
 def _manifest_of(found: Any) -> Manifest | None:
     """Return a manifest that was checked before it went into the index; None: it is of another version of the platform."""
-    if not isinstance(found, dict) or found.keys() != _FIELDS:
-        return None
     try:
         return Manifest(**{
             **found,

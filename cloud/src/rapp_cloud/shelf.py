@@ -22,7 +22,7 @@ from rapp_cloud.ledger import Expiry, Ledger, Lists
 from rapp_cloud.packages import PackageFiles
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.archive import extract, inspect, package_file_name
-from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.manifest import Manifest, check_numbers
 from rapp_hop.hz.standing import YANKED, custom_of, pattern
 from rapp_hop.hz.tar import Limits
 
@@ -132,6 +132,7 @@ class Shelf:
         """
         contents = inspect(io.BytesIO(package), self._limits)
         manifest = contents.manifest
+        check_numbers(manifest)
         if not contents.for_hop:
             raise Invalid(f"cannot publish {manifest.name}: it has no etc/weblet.info, build it with ./rapp hz build")
         path = package_file_name(manifest.name, manifest.version.text)

@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 from fakes.packages import source_folder
-from rapp_cloud import packages
+from rapp_cloud import packages, shelf
 from rapp_cloud.packages import PackageFiles
 from rapp_cloud.shelf import Shelf
-from rapp_hop.errors import Bug
+from rapp_hop.errors import Bug, Invalid
+from rapp_hop.hz import archive
 from rapp_hop.hz.archive import build
 
 NAMES = ["first", "second", "third"]
@@ -75,7 +76,7 @@ def test_a_package_that_was_changed_is_noticed(folder: Path, change: str) -> Non
         names(folder)
 
 
-@pytest.mark.parametrize("spoilt", [b"", b"\x00\xff" * 40, b"[]\n{}\n[1,2]\n", None])
+@pytest.mark.parametrize("spoilt", [b"", b"\x00\xff" * 40, b"[]\n{}\n[1,2]\nnull\n5\n[[],1,2,3,4]\n", None])
 def test_a_spoilt_index_is_made_up_for(folder: Path, spoilt: bytes | None, inspected: list[str]) -> None:
     names(folder)
     index(folder).write_bytes(index(folder).read_bytes()[:-40] if spoilt is None else spoilt)
@@ -93,6 +94,33 @@ def test_an_index_of_lines_that_count_no_more_is_written_anew(folder: Path, monk
     index(folder).write_bytes(index(folder).read_bytes() * 5)
     assert names(folder) == NAMES
     assert index(folder).stat().st_size <= size
+
+
+def test_lines_of_another_version_of_the_platform_do_not_count(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, inspected: list[str]
+) -> None:
+    names(folder)
+    monkeypatch.setattr(packages, "_FORMAT", packages._FORMAT + 1)
+    assert names(folder) == NAMES
+    assert len(inspected) == 6
+    assert {"Manifest.name", "Permissions.core", "Needs.api"} <= set(packages._FIELDS)
+
+
+def test_a_manifest_that_the_index_cannot_hold_keeps_nobody_from_starting(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, inspected: list[str]
+) -> None:
+    source = source_folder(folder, "huge", parameters={"most": 2**64})
+    with pytest.raises(Invalid, match="more than 64 bits"):
+        build(source)
+    with monkeypatch.context() as before:  # a platform that did not look
+        for module in (archive, shelf):
+            before.setattr(module, "check_numbers", lambda _manifest: None)
+        package = build(source)
+        Shelf(folder / "tuf", folder / "keys").publish(package)
+    assert names(folder) == names(folder) == ["first", "huge", "second", "third"]
+    assert inspected.count("huge-1.0.0.hz") == 2 and inspected.count("first-1.0.0.hz") == 1
+    with pytest.raises(Invalid, match="more than 64 bits"):
+        Shelf(folder / "tuf", folder / "keys").publish(package)
 
 
 def test_where_the_index_cannot_be_written_packages_are_read_again(folder: Path) -> None:

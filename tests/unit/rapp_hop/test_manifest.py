@@ -7,7 +7,7 @@ import pytest
 
 from fakes.packages import manifest
 from rapp_hop.errors import Invalid
-from rapp_hop.hz.manifest import CORE_SERVICES, Manifest, parse_manifest, reasons_against
+from rapp_hop.hz.manifest import CORE_SERVICES, Manifest, check_numbers, parse_manifest, reasons_against
 from rapp_hop.hz.semver import parse_version, satisfies
 
 
@@ -27,6 +27,13 @@ def test_a_right_one() -> None:
 
 def test_a_dynamic_agent_may_be_javascript() -> None:
     assert read(manifest(runtime="javascript")).runtime == "javascript"
+
+
+@pytest.mark.parametrize("parameters", [{"a": 2**63}, {"a": {"b": [1, [-(2**63) - 1]]}}])
+def test_integers_of_more_than_64_bits_are_not_published(parameters: dict[str, Any]) -> None:
+    with pytest.raises(Invalid, match="more than 64 bits"):
+        check_numbers(read(manifest(parameters=parameters)))
+    check_numbers(read(manifest(parameters={"a": [2**63 - 1, -(2**63), 1e300, True, None, "9" * 30]})))
 
 
 def test_left_out_parts_grant_nothing() -> None:

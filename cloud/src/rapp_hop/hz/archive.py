@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rapp_hop.errors import Invalid, Refused
-from rapp_hop.hz.manifest import MAX_BYTES, Manifest, parse_manifest
+from rapp_hop.hz.manifest import MAX_BYTES, Manifest, check_numbers, parse_manifest
 from rapp_hop.hz.tar import BLOCK, Limits, Member, TarReader, checked_path
 from rapp_hop.hz.weblet import WEBLET_INFO, weblet_info
 
@@ -51,6 +51,7 @@ def build(folder: Path, limits: Limits | None = None) -> bytes:
     limits = limits or Limits()
     try:
         manifest = parse_manifest((folder / MANIFEST).read_bytes())
+        check_numbers(manifest)
         packer = zlib.compressobj(9, zlib.DEFLATED, 31)
         pieces = [packer.compress(piece) for piece in _tar(folder, manifest, limits)]
     except OSError as error:

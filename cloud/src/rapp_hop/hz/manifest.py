@@ -22,6 +22,7 @@ MAX_WORD = 64  # characters of a keyword
 MAX_SENTENCE = 200  # characters
 MAX_LANGUAGES = 32
 MAX_PER_LANGUAGE = 64  # keywords or sentences
+MAX_INTEGER = 2**63 - 1  # what readers of JSON in all languages hold
 RUNTIMES = ("python3", "javascript")  # of dynamic agents; cloud agents are Python
 _RAPP_KEYS = {"agent", "entry", "runtime", "keywords", "sentences", "permissions", "partner", "needs", "parameters"}
 
@@ -106,6 +107,22 @@ def parse_manifest(data: bytes) -> Manifest:
     )
     _check_kind(manifest)
     return manifest
+
+
+def check_numbers(manifest: Manifest) -> None:
+    """Check what a package must keep to from now on; one that is on offer already, and does not, is still read.
+
+    :raises Invalid: an integer in its parameters has more than 64 bits
+    """
+    waiting: list[Any] = [manifest.parameters]
+    while waiting:
+        item = waiting.pop()
+        if isinstance(item, Mapping):
+            waiting.extend(item.values())
+        elif isinstance(item, list):
+            waiting.extend(item)
+        elif isinstance(item, int) and not -MAX_INTEGER - 1 <= item <= MAX_INTEGER:
+            raise Invalid("cannot use rapp.parameters in package.json: an integer has more than 64 bits, write it as a text")
 
 
 def _check_kind(manifest: Manifest) -> None:
