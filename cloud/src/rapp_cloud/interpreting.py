@@ -41,16 +41,18 @@ class Interpreting:
         known: Manifests | None = None
         try:
             while True:
+                pause = self._timeout
                 try:
                     offered = await asyncio.to_thread(manifests)
                     if offered is not known:
                         for language in sorted({language for manifest in offered for language in manifest.sentences}):
                             await self._learn(_spoken(offered, language), language)
-                    known = offered
-                    await asyncio.sleep(_PERIOD)
+                    known, pause = offered, _PERIOD
                 except HopError as error:
                     _log.error("%s; what is new in the store is learnt later", error)
-                    await asyncio.sleep(self._timeout)
+                except Exception:  # noqa: BLE001 (a worker's own, of any kind; nobody waits for this task)
+                    _log.exception("what is new in the store could not be learnt, and is later")
+                await asyncio.sleep(pause)
         finally:
             if self._learning is not None:
                 self._learning.cancel()
@@ -65,14 +67,14 @@ class Interpreting:
     def _missing(self, commands: Commands, language: str) -> list[str]:
         if commands is self._last:
             return []
-        known = self._learnt.setdefault(language, set())
+        known = self._learnt.get(language, set())  # a language is entered when it was learnt, not when somebody names it
         return [text for text in dict.fromkeys(chain.from_iterable(commands.values())) if text not in known]
 
     async def _work(self, sentences: list[str], language: str) -> None:
         for first in range(0, len(sentences), _AT_ONCE):
             part = sentences[first : first + _AT_ONCE]
             await self._workers.run("learn", part, language, timeout=self._timeout)
-            self._learnt[language].update(part)
+            self._learnt.setdefault(language, set()).update(part)
 
 
 def _spoken(offered: Manifests, language: str) -> Commands:

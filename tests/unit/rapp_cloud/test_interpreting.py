@@ -9,6 +9,7 @@ from typing import Any, cast
 import pytest
 
 from fakes.packages import manifest
+from rapp_cloud.interpreter.errors import Bug
 from rapp_cloud.interpreting import Interpreting
 from rapp_hop.errors import Unreachable
 from rapp_hop.hz.manifest import Manifest, parse_manifest
@@ -67,6 +68,15 @@ def test_each_sentence_is_learnt_once_before_the_first_answer() -> None:
     run(test)
 
 
+def test_languages_that_somebody_only_names_are_not_remembered() -> None:
+    async def test(workers: FakeWorkers, interpreting: Interpreting) -> None:
+        for number in range(100):
+            await interpreting(SOUND, {}, f"language {number}")
+        assert (workers.learnt, interpreting._learnt, len(workers.interpreted)) == ([], {}, 100)
+
+    run(test)
+
+
 def test_many_are_learnt_in_pieces() -> None:
     async def test(workers: FakeWorkers, interpreting: Interpreting) -> None:
         await interpreting(SOUND, {"a": tuple(f"sentence {number}" for number in range(150))}, "en")
@@ -99,14 +109,17 @@ def test_what_could_not_be_learnt_is_said_and_learnt_the_next_time() -> None:
     run(test)
 
 
-def test_what_is_on_offer_is_learnt_although_nobody_asks() -> None:
+@pytest.mark.parametrize("wrong", [Unreachable("cannot finish learn"), KeyError("a worker's"), Bug("a model"), OSError()])
+def test_what_is_on_offer_is_learnt_although_nobody_asks(wrong: Exception, caplog: pytest.LogCaptureFixture) -> None:
     async def test(workers: FakeWorkers, interpreting: Interpreting) -> None:
-        workers.wrong = Unreachable("cannot finish learn")  # the first time: later again
+        workers.wrong = wrong  # the first time: later again
         keeping = asyncio.create_task(interpreting.keep_learning(lambda: (rapp("a", "one"), rapp("b", "two", "one"))))
         while len(workers.learnt) < 2:
             await asyncio.sleep(0)
         keeping.cancel()
         await asyncio.gather(keeping, return_exceptions=True)
         assert workers.learnt == ["one", "two"]
+        assert [record.levelname for record in caplog.records] == ["ERROR"]
+        assert (type(wrong).__name__ in caplog.text) is not isinstance(wrong, Unreachable)
 
     run(test)
