@@ -32,6 +32,7 @@ class Certificate:
         self._files = certificate, key
         self._clock = clock
         self._taken = self._seen = _state(self._files)
+        self._told: tuple[list[tuple[int, ...]], str] | None = None  # what was wrong with which files
         self._reminded: float | None = None
         self.context = server_tls(certificate, key)
         self.until = validity(certificate)[1]  # UTC, seconds since 1970
@@ -59,18 +60,21 @@ class Certificate:
         state, before = _state(self._files), self._seen
         self._seen = state
         if state != self._taken and state == before:  # else somebody may still be writing
-            self._taken = state
-            self._renew()
+            self._renew(state)
         self._warn()
 
-    def _renew(self) -> None:
+    def _renew(self, state: list[tuple[int, ...]]) -> None:
+        """Take the files, or say once what is wrong: they may be good a while later, though nothing changes in them."""
         try:
             context, (since, until) = server_tls(*self._files), validity(self._files[0])
             if not since <= self._clock() < until:
                 raise Invalid(f"cannot use {self._files[0]}: it has expired or is not good yet, put one there that is good now")
         except HopError as error:
-            _log.error("%s; meanwhile the certificate of before stays, good until %s", error, self.end)
+            if self._told != (state, str(error)):
+                _log.error("%s; meanwhile the certificate of before stays, good until %s", error, self.end)
+            self._told = state, str(error)
             return
+        self._taken, self._told = state, None
         self._shown, self.until, self._reminded = context, until, None
         _log.info("certificate: %s is new, good until %s", self.name, self.end)
 

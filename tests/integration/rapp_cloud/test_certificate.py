@@ -2,8 +2,10 @@
 
 import asyncio
 import datetime
+import errno
 import json
 import logging
+import os
 import ssl
 import subprocess
 import sys
@@ -12,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.client import HTTPSConnection
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -212,6 +215,32 @@ def test_o03_what_is_wrong_with_new_files_is_said_once_and_mended(
     files.put(authority.issue())
     for _ in range(2):
         shown.look()
+    assert shown.until == LATER.timestamp()
+
+
+def test_o03_files_that_are_not_good_yet_are_taken_when_they_are(
+    shown: Certificate, files: Files, authority: Authority, clock: list[float], caplog: pytest.LogCaptureFixture
+) -> None:
+    files.put(authority.issue(LATER, MIDNIGHT))
+    for _ in range(3):
+        shown.look()
+    assert shown.until == MIDNIGHT.timestamp() and len(caplog.records) == 1
+    clock[0] = MIDNIGHT.timestamp()
+    shown.look()
+    assert shown.until == LATER.timestamp()
+
+
+def test_o03_files_that_could_not_be_opened_for_a_moment_are_taken_later(
+    shown: Certificate, files: Files, authority: Authority, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    files.put(authority.issue())
+    with monkeypatch.context() as moment:
+        moment.setattr(Path, "read_bytes", Mock(side_effect=OSError(errno.EMFILE, os.strerror(errno.EMFILE))))
+        for _ in range(3):
+            shown.look()
+    assert shown.until == MIDNIGHT.timestamp()
+    assert [record.getMessage().partition(": ")[2].partition(";")[0] for record in caplog.records] == ["Too many open files"]
+    shown.look()
     assert shown.until == LATER.timestamp()
 
 
