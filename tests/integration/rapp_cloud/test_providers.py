@@ -167,7 +167,8 @@ def test_a_new_key_at_home(cloud: CloudProcess, someone: Callable[[str], Provide
     assert nina.owner(capsys, "keys", "rotate", "nina", "--public", str(nina.file)) == 1
     assert "run it again" in nina.err  # its list is too old by now
     assert nina.far(capsys, "keys", "own", "nina", "-o", str(nina.file)) == 0, nina.err
-    assert nina.owner(capsys, "keys", "rotate", "nina", "--public", str(nina.file)) == 0, nina.err
+    assert nina.far(capsys, "keys", "own", "nina", "-o", str(tmp_path / "later.publisher")) == 0, nina.err
+    assert nina.owner(capsys, "keys", "rotate", "nina", "--public", str(nina.file)) == 0, nina.err  # the file before
     assert nina.far(capsys, "publish", rapp(tmp_path, "note", "1.2.0")) == 0, nina.err
     assert installed(cloud, tmp_path / "robot", "note") == "1.2.0"
     assert nina.owner(capsys, "keys", "revoke", "nina") == 0
@@ -179,6 +180,7 @@ def test_a_new_key_at_home(cloud: CloudProcess, someone: Callable[[str], Provide
     assert nina.run(capsys, *words) == 0
     assert nina.owner(capsys, "keys", "new", "nina", "--public", str(nina.file)) == 1 and "--after 5" in nina.err
     assert nina.run(capsys, *words, "--after", "5") == 0
+    assert nina.run(capsys, *words, "-o", str(tmp_path / "later.publisher"), "--after", "5") == 0
     assert nina.owner(capsys, "keys", "new", "nina", "--public", str(nina.file)) == 0, nina.err
     assert nina.far(capsys, "publish", source) == 0, nina.err
     assert installed(cloud, tmp_path / "robot", "note") == "1.3.0"

@@ -7,7 +7,17 @@ from securesystemslib.signer import CryptoSigner
 
 from rapp_cli.errors import UsageError
 from rapp_cli.home.place import add_home_option
-from rapp_cli.store.remote import NEXT, RemoteStore, add_cloud_option, folder_of, remote_of, ring_of, signer_of, with_store
+from rapp_cli.store.remote import (
+    NEXT,
+    RemoteStore,
+    add_cloud_option,
+    folder_of,
+    free_place,
+    remote_of,
+    ring_of,
+    signer_of,
+    with_store,
+)
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import KeyRing
 from rapp_hop.hz.application import first_list, write_application
@@ -41,7 +51,7 @@ def make_own(options: argparse.Namespace) -> int:
     if options.cloud:
         data, action = _to_follow(options, ring, name), "rotate"
     else:
-        kept = NEXT + name if options.anew and ring.has(name) else name  # the store says later which one counts
+        kept = free_place(ring, name) if options.anew and ring.has(name) else name  # the store says later which one counts
         if options.anew or not ring.has(name):
             ring.keep(kept, ring.new(name))
         data, action = write_application(name, ring.signer(kept), first_list(options.after)), "new"
@@ -58,5 +68,5 @@ def _to_follow(options: argparse.Namespace, ring: KeyRing, name: str) -> bytes:
     if ring.has(name):
         signer_of(ring, standing)  # puts an earlier new key in its place
     follows: CryptoSigner = ring.new(name)
-    ring.keep(NEXT + name, follows)
+    ring.keep(free_place(ring, name), follows)
     return write_application(name, follows, standing.renewed())

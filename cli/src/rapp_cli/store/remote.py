@@ -7,8 +7,10 @@ rollback). The platform gives them a token and its root; a token is never a word
 import argparse
 import asyncio
 import hashlib
+import itertools
 import logging
 import os
+import re
 import ssl
 import tempfile
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
@@ -149,15 +151,22 @@ def publisher_of(ring: KeyRing, wanted: str | None) -> str:
     return wanted
 
 
+def free_place(ring: KeyRing, name: str) -> str:
+    """Return where to keep one more key that the store does not know yet: the owner may have the file of each earlier one."""
+    places = (f"{NEXT}{number}_{name}" if number > 1 else NEXT + name for number in itertools.count(1))
+    return next(place for place in places if not ring.has(place))
+
+
 def signer_of(ring: KeyRing, standing: Standing) -> CryptoSigner:
     """Return the key by which the store knows a publisher, which may be one that was new until now.
 
     :raises Refused: when it is not here
     """
     name = standing.publisher
-    if ring.has(NEXT + name) and (signer := ring.signer(NEXT + name)).public_key.keyid in standing.role.keyids:
-        ring.keep(name, signer)
-        ring.remove(NEXT + name)
+    for kept in filter(re.compile(rf"{NEXT}(\d+_)?{name}").fullmatch, ring.names()):
+        if (signer := ring.signer(kept)).public_key.keyid in standing.role.keyids:
+            ring.keep(name, signer)
+            ring.remove(kept)
     signer = ring.signer(name)
     if signer.public_key.keyid not in standing.role.keyids:
         known = ", ".join(standing.role.keyids)
