@@ -24,6 +24,8 @@ from rapp_hop.errors import HopError
 from rapp_hop.hz.archive import build
 from rapp_hop.hz.text import check_name
 
+_OPEN_FILES = 65536  # connections, files on their way and pipes of one platform
+
 
 def main(words: list[str] | None = None) -> int:
     """Run the command that the words name; return its exit status."""
@@ -62,7 +64,16 @@ def _options(words: list[str]) -> CloudConfig:
     return config
 
 
+def _allow_open_files() -> None:
+    """The system's first limit is often 1024, for programs that use select()."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _OPEN_FILES if hard == resource.RLIM_INFINITY else min(hard, _OPEN_FILES)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
 async def _serve(config: CloudConfig) -> int:
+    _allow_open_files()
     stop = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)

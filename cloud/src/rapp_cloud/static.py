@@ -1,12 +1,13 @@
 """The store's files over HTTP: `/tuf/metadata/<file>` and `/tuf/targets/<file>`, nothing above or below."""
 
 import asyncio
+import errno
 import os
 import re
 import stat
 from pathlib import Path
 
-from rapp_hop.errors import Refused
+from rapp_hop.errors import Refused, Unreachable
 from rapp_hop.mounts import Mount, Visit
 from rapp_hop.protocol import OpenFile, WireAnswer
 from rapp_hop.results import ANY_TYPE
@@ -14,6 +15,7 @@ from rapp_hop.results import ANY_TYPE
 _RANGE = re.compile(r"bytes=(\d{1,18})-", re.ASCII)  # the rest of a file; other ranges get the whole (RFC 9110 section 14.2)
 _NAME = re.compile(r"[0-9A-Za-z][0-9A-Za-z._-]{0,200}", re.ASCII)  # no separator, no dot first
 _KNOWN = 4096  # files
+_NONE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENXIO}  # no file of that name
 
 
 def store_files(prefix: str, folder: Path) -> Mount:
@@ -44,8 +46,11 @@ def store_files(prefix: str, folder: Path) -> Mount:
 def _open(path: Path) -> OpenFile | None:
     try:
         file = path.open("rb")
-    except OSError:
-        return None
+    except OSError as error:
+        if error.errno in _NONE:
+            return None
+        # Never 404: for a robot that asks for the next root, that is the end of the list.
+        raise Unreachable(f"cannot open this file of the store: {error.strerror}, try again later", 503) from None
     status = os.fstat(file.fileno())
     if not stat.S_ISREG(status.st_mode):
         file.close()
