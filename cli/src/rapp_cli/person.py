@@ -46,6 +46,11 @@ class Person:
         """Wait for the next text the robot has finished saying."""
         return await self._heard.get()
 
+    def forget(self) -> None:
+        """What was heard until now is answered by nobody."""
+        while not self._heard.empty():
+            self._heard.get_nowait()
+
     async def say(self, text: str) -> None:
         """Say a text; returns when it has been spoken."""
         assert self._world is not None

@@ -58,6 +58,9 @@ class Room:
     async def next_heard(self) -> str:
         return await self._heard.get()
 
+    def forget(self) -> None:
+        assert self._heard.empty()
+
     async def say(self, text: str) -> None:
         if text in ("yes", "no"):
             self.replies.append(text)

@@ -2,7 +2,7 @@
 
 import argparse
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from rapp_cli.person import Person
 from rapp_cli.store import new, trial
 from rapp_cli.timeline import Entry
 
@@ -24,21 +25,46 @@ def apology(text: str) -> list[tuple[str, str, str, str]]:
     return [("core", "s11", "entered", "say what failed"), ("core", "s11", "said", text)]
 
 
-def tried(folder: Path, monkeypatch: pytest.MonkeyPatch, happens: list[tuple[str, str, str, str]]) -> int:
-    """What `./rapp run` gives for a new RApp when this happens once its keyword is said."""
+def tried(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    happens: list[tuple[str, str, str, str]],
+    asks: str = "",
+    answers: Sequence[str] = (),
+) -> int:
+    """What `./rapp run` gives for a new RApp when this happens once its keyword is said; what it asks must be answered first."""
     new.run(argparse.Namespace(name="greeter", javascript=False, folder=folder))
     seen: asyncio.Queue[tuple[str, str, str, str]] = asyncio.Queue()
 
-    class Person:
+    class Silent(Person):
         def __init__(self, *_: Any) -> None:
-            pass
+            super().__init__("", "")
+            self._asked = ""  # what the robot has said last that wants an answer
 
         async def enter(self) -> None:
+            self._hear("I am ready")
             for entry in LISTENS:
                 seen.put_nowait(entry)
 
-        async def say(self, _text: str) -> None:
-            for entry in [*HEARS, *happens, *LISTENS]:
+        async def say(self, text: str) -> None:
+            if text in answers:
+                assert self._asked == asks
+                self._tell(happens)
+                return
+            assert not self._asked, "it was asked for once"
+            for entry in HEARS:
+                seen.put_nowait(entry)
+            if asks:
+                asyncio.get_running_loop().call_later(0.05, self._ask)
+            else:
+                self._tell(happens)
+
+        def _ask(self) -> None:
+            self._asked = asks
+            self._hear(asks)
+
+        def _tell(self, entries: list[tuple[str, str, str, str]]) -> None:
+            for entry in [*entries, *LISTENS]:
                 seen.put_nowait(entry)
 
         async def leave(self) -> None:
@@ -54,10 +80,10 @@ def tried(folder: Path, monkeypatch: pytest.MonkeyPatch, happens: list[tuple[str
         yield SimpleNamespace(robot="", bridge="", logs=folder)
 
     monkeypatch.setenv("XDG_DATA_HOME", str(folder / "data"))
-    monkeypatch.setattr(trial, "Person", Person)
+    monkeypatch.setattr(trial, "Person", Silent)
     monkeypatch.setattr(trial, "follow", follow)
     monkeypatch.setattr(trial, "running_system", running_system)
-    words = argparse.Namespace(folder=folder / "greeter", say=None, answer=[], timeout=60.0)
+    words = argparse.Namespace(folder=folder / "greeter", say=None, answer=list(answers), timeout=60.0)
     return trial.run(words)
 
 
@@ -88,3 +114,7 @@ def test_one_that_does_what_it_shall_has_ended_well(
 ) -> None:
     assert tried(tmp_path, monkeypatch, [*STARTS, *RUNS]) == 0
     assert capsys.readouterr().out.endswith("rapp run: it has ended well\n")
+
+
+def test_an_answer_is_for_the_rapp_and_not_for_a_robot_that_is_ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert tried(tmp_path, monkeypatch, [*STARTS, *RUNS], asks="what is your name?", answers=["Eva"]) == 0

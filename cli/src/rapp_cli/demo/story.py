@@ -32,6 +32,7 @@ async def ask(person: Person, command: str, timeline: Timeline, until: str = "s9
     listening = await timeline.wait_for("core", "entered", "s3")
     for _ in range(ASKS):
         await asyncio.sleep(THINKING)
+        person.forget()  # that the robot is ready asks nothing
         await person.say(command)
         try:
             return await asyncio.wait_for(timeline.wait_for("core", "entered", until, listening), PATIENCE)

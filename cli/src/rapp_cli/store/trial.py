@@ -67,12 +67,14 @@ async def _once(config: demo.DemoConfig, system: System, timeline: Timeline, ans
     """What happens from the robot's hearing the keyword until it listens again."""
     person = Person(system.robot, config.voice)
     await person.enter()
-    answering = asyncio.create_task(_answer(person, list(answers)))
+    answering: asyncio.Task[None] | None = None
     try:
         heard = await ask(person, config.command, timeline, until="s4")
+        answering = asyncio.create_task(_answer(person, answers))
         await timeline.wait_for(CORE, "entered", "s3", heard)
     finally:
-        answering.cancel()
+        if answering is not None:
+            answering.cancel()
         await person.leave()
     return timeline.entries[heard:]
 
