@@ -14,6 +14,7 @@ from rapp_cli.person import Person
 from rapp_cli.store import new, trial
 from rapp_cli.timeline import Entry
 
+Told = tuple[str, str, str, str]
 LISTENS = [("core", "s3", "entered", "listen")]
 HEARS = [("core", "s3", "heard", "greeter"), ("core", "s4", "entered", "keyword")]
 STARTS = [("core", "s8", "entered", "await first word"), ("dynamic", "s2", "entered", "initialise")]
@@ -21,54 +22,48 @@ RUNS = [("core", "s9", "entered", "await and execute commands")]
 FAILS = [("dynamic", "execute", "failed", "ValueError: boom")]
 
 
-def apology(text: str) -> list[tuple[str, str, str, str]]:
+def apology(text: str) -> list[Told]:
     return [("core", "s11", "entered", "say what failed"), ("core", "s11", "said", text)]
 
 
-def tried(
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    happens: list[tuple[str, str, str, str]],
-    asks: str = "",
-    answers: Sequence[str] = (),
-) -> int:
-    """What `./rapp run` gives for a new RApp when this happens once its keyword is said; what it asks must be answered first."""
+class Silent(Person):
+    """Hears that the robot is ready, then what a RApp asks once its keyword is said; only the right moment's answer counts."""
+
+    def __init__(self, seen: asyncio.Queue[Told], happens: list[Told], asks: str, answers: Sequence[str]) -> None:
+        super().__init__("", "")
+        self._seen, self._happens, self._asks, self._answers = seen, happens, asks, answers
+        self._asked = False
+
+    async def enter(self) -> None:
+        self._hear("I am ready")
+        self._tell(LISTENS)
+
+    async def say(self, text: str) -> None:
+        if text in self._answers:
+            assert self._asked
+        else:
+            self._tell(HEARS)
+        if text in self._answers or not self._asks:
+            self._tell([*self._happens, *LISTENS])
+        else:
+            asyncio.get_running_loop().call_later(0.05, self._ask)
+
+    def _ask(self) -> None:
+        self._asked = True
+        self._hear(self._asks)
+
+    def _tell(self, entries: list[Told]) -> None:
+        for entry in entries:
+            self._seen.put_nowait(entry)
+
+    async def leave(self) -> None:
+        pass
+
+
+def tried(folder: Path, monkeypatch: pytest.MonkeyPatch, happens: list[Told], asks: str = "", answers: Sequence[str] = ()) -> int:
+    """What `./rapp run` gives for a new RApp when this happens once its keyword is said, and what it asks is answered."""
     new.run(argparse.Namespace(name="greeter", javascript=False, folder=folder))
-    seen: asyncio.Queue[tuple[str, str, str, str]] = asyncio.Queue()
-
-    class Silent(Person):
-        def __init__(self, *_: Any) -> None:
-            super().__init__("", "")
-            self._asked = ""  # what the robot has said last that wants an answer
-
-        async def enter(self) -> None:
-            self._hear("I am ready")
-            for entry in LISTENS:
-                seen.put_nowait(entry)
-
-        async def say(self, text: str) -> None:
-            if text in answers:
-                assert self._asked == asks
-                self._tell(happens)
-                return
-            assert not self._asked, "it was asked for once"
-            for entry in HEARS:
-                seen.put_nowait(entry)
-            if asks:
-                asyncio.get_running_loop().call_later(0.05, self._ask)
-            else:
-                self._tell(happens)
-
-        def _ask(self) -> None:
-            self._asked = asks
-            self._hear(asks)
-
-        def _tell(self, entries: list[tuple[str, str, str, str]]) -> None:
-            for entry in [*entries, *LISTENS]:
-                seen.put_nowait(entry)
-
-        async def leave(self) -> None:
-            pass
+    seen: asyncio.Queue[Told] = asyncio.Queue()
 
     async def follow(_bridge: str) -> AsyncIterator[Entry]:
         while True:
@@ -80,7 +75,7 @@ def tried(
         yield SimpleNamespace(robot="", bridge="", logs=folder)
 
     monkeypatch.setenv("XDG_DATA_HOME", str(folder / "data"))
-    monkeypatch.setattr(trial, "Person", Silent)
+    monkeypatch.setattr(trial, "Person", lambda *_: Silent(seen, happens, asks, answers))
     monkeypatch.setattr(trial, "follow", follow)
     monkeypatch.setattr(trial, "running_system", running_system)
     words = argparse.Namespace(folder=folder / "greeter", say=None, answer=list(answers), timeout=60.0)
@@ -97,7 +92,7 @@ def tried(
     ],
 )
 def test_a_rapp_that_fails_is_not_said_to_have_ended_well(
-    happens: list[tuple[str, str, str, str]],
+    happens: list[Told],
     told: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
