@@ -160,6 +160,8 @@ console.log("FACTS " + JSON.stringify([said.success, (await result).success, fee
     ("program", "detail"),
     [
         ("Promise.reject(new RangeError('left alone')); await this.pause(60);", "RangeError: left alone"),
+        ("await Promise.reject();", "Error: undefined was thrown"),
+        ("throw new Error('\\ud83d');", "Error: ?"),
         ("}} this is no program {{", "SyntaxError"),
     ],
 )
@@ -169,6 +171,28 @@ def test_a_program_that_fails_says_how(workshop, wait_for, program, detail):
     assert run.outcome[0] == "failed"
     assert run.outcome[1].startswith(detail)
     assert workshop.finish(run)[1] == "failed"
+
+
+def test_what_fails_where_nobody_waits_leads_to_s4_too(workshop):
+    """Fig. 3: every failure leads there, and the task's own end comes too late to count."""
+    run = workshop.start(
+        "this.terminate = () => console.log('tidied');\nsetTimeout(() => { throw null; }, 50);\nawait this.pause(0.3);",
+        runtime="javascript",
+    )
+    text, outcome = workshop.finish(run)
+    assert (outcome, "tidied" in text) == ("failed", True), text
+
+
+def test_a_file_too_large_for_a_call_harms_no_other_call(workshop, core):
+    body = """
+facts = [
+  await attempt(() => keepsakes.keep("large", Buffer.alloc(30_000_000))),
+  await attempt(() => keepsakes.keep("small", "text")),
+];
+"""
+    facts, _, _ = told(workshop, body, ("rapp_keep",))
+    assert facts[0] == ["Refused", "cannot call rapp_keep: more than 16 MiB at once; send smaller files"]
+    assert facts[1][0] == "did"
 
 
 def test_an_es_module_is_a_rapp_too(workshop):
@@ -205,7 +229,10 @@ def test_a_robot_that_has_such_rapps_keeps_node_warm_and_other_rapps_do_not_meet
 
 def words_of(pid: int) -> set[bytes]:
     """The words that started a process, without their folders."""
-    return {word.rpartition(b"/")[2] for word in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")}
+    try:
+        return {word.rpartition(b"/")[2] for word in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")}
+    except OSError:
+        return set()  # it has ended meanwhile
 
 
 # ends that are none
@@ -235,7 +262,8 @@ def test_an_event_loop_that_stands_still_beats_on_but_does_not_count_and_is_ende
     wait_for(lambda: all(ended(pid) for pid in inside))
 
 
-def test_a_rapp_whose_rosbridge_dies_is_told_so(workshop, core, wait_for):
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_rapp_whose_rosbridge_dies_or_stands_still_is_told_so(workshop, core, number):
     """Its next calls are unreachable, as everything is."""
     body = """
 let failed = null;
@@ -246,7 +274,7 @@ console.log("FACTS", failed.name, failed.message);
 """
     run = workshop.start(body, runtime="javascript")
     victim = next(pid for pid in inside_of(run) if b"rapp_bridge" in words_of(pid))
-    os.kill(victim, signal.SIGKILL)
+    os.kill(victim, number)
     text, outcome = workshop.finish(run)
     assert outcome == "done", text
     assert "FACTS Unreachable cannot" in text

@@ -249,6 +249,8 @@ def test_messages_cross_the_channel_one_per_line(ends):
     assert channel.receive() == {"type": "ready"}
     theirs.sendall(b'beat"}\n')
     assert channel.receive() == {"type": "heartbeat"}
+    theirs.sendall(b'{"type": "state", "detail": "half of \\ud83d"}\n')
+    assert channel.receive() == {"type": "state", "detail": "half of ?"}
     theirs.close()
     assert channel.receive() is None
 

@@ -1,12 +1,14 @@
 """The core agent's own word beside the vocabularies of others."""
 
+from collections.abc import Sequence
+
 import pytest
 
 from fakes.robot import FakeRobot
 from rapp_core.config import Config
 from rapp_core.control.attention import Attention, OwnVoice
 from rapp_core.control.words import STOP
-from rapp_core.errors import Unreachable
+from rapp_core.errors import Refused, Unreachable
 from rapp_core.ports import Sound, Word
 
 SURE = 0.8
@@ -132,6 +134,32 @@ def test_a_robot_that_was_away_is_attended_to_again(room: Room) -> None:
     room.attend()
     room.say("stop")
     assert room.called == ["stop"]
+
+
+def test_after_a_new_session_whoever_listens_hears_again(room: Room) -> None:
+    room.attend()
+    room.listen("clock")
+    room.fake.body.listener = None
+    room.attend()
+    room.say("clock")
+    room.say("stop")
+    assert (room.words(), room.called) == (["clock"], ["stop"])
+
+
+def test_a_word_that_the_robot_does_not_take_takes_nobody_else_s(room: Room, monkeypatch: pytest.MonkeyPatch) -> None:
+    take = room.fake.robot.ears.set_vocabulary
+
+    def refuse(words: Sequence[str]) -> None:
+        if "stop" in words:
+            raise Refused("cannot recognise 'stop'")
+        take(words)
+
+    monkeypatch.setattr(room.fake.robot.ears, "set_vocabulary", refuse)
+    with pytest.raises(Refused):
+        room.attend()
+    room.listen("clock")
+    room.say("clock")
+    assert room.words() == ["clock"]
 
 
 def test_in_a_language_without_the_word_nothing_is_listened_for(room: Room) -> None:

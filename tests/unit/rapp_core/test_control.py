@@ -1,5 +1,7 @@
 """The core FSM (paper Fig. 2) with everything around it in memory: ways through it, failures, bounds."""
 
+import errno
+import json
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -587,6 +589,18 @@ def test_l11_what_the_person_has_stopped_has_not_failed(home: Home) -> None:
     assert home.fake.said() == [STOP_WORDS] * 4
 
 
+def test_l11_a_stop_that_comes_after_the_failure_changes_nothing(home: Home) -> None:
+    home.agents.script = Script(outcome=("failed", "KeyError: 'name'"))
+    home.start()
+    ask(home)
+    home.step_until(lambda: home.machine.state == "s10")
+    lay_hand(home)
+    home.step_until(lambda: home.machine.state == "s3")
+    assert home.fake.said() == ["It has failed"]
+    (entry,) = json.loads((home.config.home / "quarantine.json").read_text()).values()
+    assert entry["failures"] == 1
+
+
 # a RApp that fails again and again
 
 
@@ -609,7 +623,9 @@ def test_l13_a_rapp_that_keeps_failing_is_not_started_for_a_while(home: Home) ->
     assert len(home.agents.runs) == 3
 
 
-@pytest.mark.parametrize("outcome", [("done", ""), ("failed", "Unreachable: cannot reach the platform")])
+@pytest.mark.parametrize(
+    "outcome", [("done", ""), ("failed", "Unreachable: cannot reach the platform"), ("failed", "Bug: cannot serve: error 500")]
+)
 def test_l13_who_succeeds_or_finds_others_away_is_started(home: Home, outcome: tuple[str, str]) -> None:
     install_rapp(home.config.home, "clock", keywords=("what time is it",))
     home.agents.script = Script(outcome=outcome)
@@ -697,6 +713,18 @@ def test_an_error_nobody_thought_of_ends_the_run_and_is_said(home: Home) -> None
     assert not home.agents.runs[0].alive
     with pytest.raises(Refused):
         home.lease.check(home.agents.runs[0].token)
+
+
+def test_a_full_disk_leaves_no_spare_but_a_core_agent_that_listens(home: Home, monkeypatch: pytest.MonkeyPatch) -> None:
+    def prepare() -> None:
+        raise OSError(errno.ENOSPC, "no space left")
+
+    home.start()
+    ask(home)
+    monkeypatch.setattr(home.agents, "prepare", prepare)
+    home.step_until(lambda: home.machine.state == "s11")
+    home.step_until(lambda: home.machine.state == "s3")
+    assert home.fake.said() == ["Something went wrong"]
 
 
 def test_a_robot_that_goes_away_is_waited_for(home: Home) -> None:

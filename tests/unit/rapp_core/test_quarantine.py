@@ -2,6 +2,7 @@
 
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,14 @@ def test_it_says_until_when(home: Home) -> None:
     assert home.refusal() == "clock keeps failing, I will not start it before tomorrow 00:02"
 
 
+def test_a_day_later_than_tomorrow_has_its_name(tmp_path: Path) -> None:
+    home = Home(tmp_path)
+    home.config = replace(home.config, quarantine_longest=2 * 86400.0, quarantine=2 * 86400.0)
+    home.restart()
+    home.fail(3)
+    assert home.refusal() == "clock keeps failing, I will not start it before Monday 12:00"
+
+
 def test_those_in_quarantine_are_listed(home: Home) -> None:
     home.fail(2)
     assert home.quarantine.present() == {}
@@ -103,7 +112,22 @@ def test_a_clock_that_went_back_ends_it(home: Home) -> None:
     assert home.refusal() is None
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{", '{"clock": 1}', '{"clock": {"version": "1.0.0"}}'])
+INFINITE = '{"clock": {"version": "1.0.0", "failures": %s, "since": 0, "until": %s, "why": ""}}'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{",
+        '{"clock": 1}',
+        '{"clock": {"version": "1.0.0"}}',
+        INFINITE % ("1e999", 1),
+        INFINITE % (3, "Infinity"),
+        INFINITE % (3, 1e300),
+    ],
+)
 def test_what_cannot_be_read_keeps_nothing_from_being_started(home: Home, text: str) -> None:
     (home.config.home / FILE).write_text(text)
     assert home.refusal() is None
@@ -115,6 +139,14 @@ def test_what_cannot_be_written_is_no_matter(tmp_path: Path) -> None:
     quarantine = Quarantine(Config(home=tmp_path / "away"))
     quarantine.failed("clock", "1.0.0", "it has crashed")
     assert quarantine.refusal("clock", "1.0.0") is None
+
+
+def test_what_cannot_be_forgotten_is_told(home: Home) -> None:
+    home.fail(3)
+    (home.config.home / FILE).with_suffix(".new").mkdir()
+    with pytest.raises(OSError):
+        home.quarantine.forget("clock")
+    assert home.refusal() is not None
 
 
 def test_what_is_kept_can_be_read_by_people(home: Home) -> None:

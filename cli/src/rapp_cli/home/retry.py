@@ -17,7 +17,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Forget its failures; the core agent looks at each start. Raises CommandError when there are none."""
-    if not Quarantine(Config(home=home_of(options).robot)).forget(options.rapp):
+    try:
+        known = Quarantine(Config(home=home_of(options).robot)).forget(options.rapp)
+    except OSError as error:
+        raise CommandError(f"cannot retry {options.rapp}: {error}; make room in the robot's folder") from error
+    if not known:
         raise CommandError(f"cannot retry {options.rapp}: it has not failed the last time; ask the robot for it")
     print(f"{options.rapp} may be started again")
     return 0

@@ -50,7 +50,12 @@ class Engine:
         ours, theirs = socket.socketpair()
         with theirs:
             environment = {**os.environ, "NODE_PATH": LIBRARIES, "RAPP_CHANNEL_FD": str(theirs.fileno())}
-            self._program = subprocess.Popen([NODE, RUNNER], pass_fds=[theirs.fileno()], env=environment)
+            try:
+                self._program = subprocess.Popen([NODE, RUNNER], pass_fds=[theirs.fileno()], env=environment)
+            except OSError:
+                ours.close()
+                _kill(self._bridge)
+                raise
         self.channel = SocketChannel(ours, lambda: None)
         """To node's side."""
 
@@ -61,9 +66,8 @@ class Engine:
 
     def end(self) -> None:
         """End and reap both."""
-        for process in (self._bridge, self._program):
-            process.kill()
-            process.wait()
+        _kill(self._bridge)
+        _kill(self._program)
 
     def death(self) -> int:
         """The exit status, never 0, of a program that has closed its channel, or broken it."""
@@ -73,6 +77,11 @@ class Engine:
             self._program.kill()
         status = self._program.wait()
         return status if status > 0 else 128 - status
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
 
 
 def warm_up(wanted: str) -> Engine | None:

@@ -35,25 +35,38 @@ class DynamicAgent {
     return step(this.#tell, "execute", name, label, work);
   }
 
-  /** Walk the agent's FSM to its end; an error in s2 or s3 leads to s4, and is reported by s5. Called once, by the runner. */
-  async run(openChannel, sendTerminate, tell) {
+  /**
+   * Walk the agent's FSM to its end; an error leads to s4, and is reported by s5. Called once, by the runner.
+   *
+   * `failed` is a promise that rejects with what fails where nobody waits for it.
+   */
+  async run(openChannel, sendTerminate, tell, failed = new Promise(() => {})) {
     this.#tell = tell;
     let problem = null;
     const doing = (name, label, work) => step(tell, "dynamic", name, label, work);
-    try {
+    const task = async () => {
       await doing("s1", "open channel", openChannel);
       await doing("s2", "initialise", () => this.initialise());
       await doing("s3", "execute", () => this.state("execute", () => this.execute()));
+    };
+    try {
+      await Promise.race([task(), failed]);
     } catch (error) {
-      problem = error;
+      problem = reason(error);
     }
     try {
-      await doing("s4", "terminate", () => this.terminate());
+      const tidied = doing("s4", "terminate", () => this.terminate());
+      await (problem ? tidied : Promise.race([tidied, failed]));
     } catch (error) {
-      problem ??= error;
+      problem ??= reason(error);
     }
     await doing("s5", "send terminate", () => sendTerminate(problem));
   }
+}
+
+/** What was thrown; an error of its own where it was nothing, such as `reject()`. */
+function reason(error) {
+  return error || new Error(`${error} was thrown`);
 }
 
 async function step(tell, machine, state, label, work) {
@@ -73,4 +86,4 @@ function words(error) {
   return error instanceof Error ? `${error.name}: ${error.message}` : `Error: ${error}`;
 }
 
-module.exports = { DynamicAgent, words };
+module.exports = { DynamicAgent, reason, words };

@@ -3,7 +3,7 @@
 
 const path = require("node:path");
 const { pathToFileURL } = require("node:url");
-const { DynamicAgent, words } = require("./agent.js");
+const { DynamicAgent, reason, words } = require("./agent.js");
 const { Bridge } = require("./bridge.js");
 const { Channel } = require("./channel.js");
 const cloud = require("./cloud.js");
@@ -20,13 +20,21 @@ let order = null;
 let agent = null;
 let ended = false;
 
-process.on("uncaughtException", terminate); // a promise that nobody waits for comes here too
+let fail;
+const failed = new Promise((_, reject) => {
+  fail = reject;
+});
+failed.catch(() => {}); // before and after the agent's run nobody else waits for it
+process.on("uncaughtException", (error) => { // a promise that nobody waits for comes here too
+  console.error("the RApp has failed where nobody waits for it", error);
+  fail(reason(error));
+});
 
 function take(message) {
   if (message.type === "activate") {
     order = message;
     setInterval(() => channel.send({ type: "heartbeat" }), BEAT);
-    be().catch(terminate);
+    be().catch((error) => terminate(reason(error)));
   } else if (message.type === "dismantle") {
     dismantle();
   }
@@ -38,7 +46,7 @@ async function be() {
   core.use((service, fields) => bridge.call(service, fields));
   const Agent = await load(path.join(order.package, order.entry));
   agent = new Agent(order.parameters);
-  await agent.run(() => channel.send({ type: "first_word", name: Agent.name }), terminate, tell);
+  await agent.run(() => channel.send({ type: "first_word", name: Agent.name }), terminate, tell, failed);
 }
 
 /** The class that the entry file exports, from CommonJS or as an ES module's default. */

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from rapp_core.config import Config
-from rapp_core.errors import CoreError
+from rapp_core.errors import CoreError, Unreachable
 from rapp_core.ports import Ears, Sound, Voice, Word
 
 Heard = Callable[[Word | Sound], None]
@@ -93,17 +93,23 @@ class Attention:
     def attend(self, called: Callable[[str], None]) -> None:
         """Tell `called` the core agent's word from now on, from a foreign thread. Raises CoreError.
 
-        To be called again after the robot was away.
+        To be called again after the robot was away (Unreachable); a word that it does not take is left out.
         """
         if self._word is None:
             return
         with self._lock:
-            self._called = called
-            if self._heard is None:
-                self._ears.unsubscribe()
-                self._listen()
-            else:
-                self._ears.set_vocabulary(self._vocabulary())
+            again, self._called = self._called is not None, called
+            try:
+                if self._heard is not None and not again:
+                    self._ears.set_vocabulary(self._vocabulary())
+                else:
+                    self._ears.unsubscribe()
+                    self._listen()
+            except Unreachable:
+                raise
+            except CoreError:
+                self._called = None
+                raise
 
     def ignore(self) -> None:
         """End `attend`; no error when there was none."""

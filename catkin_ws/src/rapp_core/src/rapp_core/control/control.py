@@ -13,13 +13,13 @@ from rapp_core.control.refusals import not_activated, not_installed, not_interpr
 from rapp_core.control.stopping import Stopping
 from rapp_core.control.trial import Trial
 from rapp_core.control.words import NONE_OF_THEM, NOT_UNDERSTOOD, READY, READY_ALONE, STOPPED
-from rapp_core.errors import CoreError, Invalid, Refused, Unreachable
+from rapp_core.errors import Bug, CoreError, Invalid, Refused, Unreachable
 from rapp_core.ports import Agent
 
 _log = logging.getLogger(__name__)
 STEP = 0.05  # s between two looks at the dynamic agent
 RETRY = 1.0  # s between tries to reach the robot
-OTHERS_AWAY = f"{Unreachable.__name__}:"  # so begins what a RApp tells of its failure when others were away
+OTHERS = (f"{Unreachable.__name__}:", f"{Bug.__name__}:")  # so begins what a RApp tells of a failure that is others' fault
 
 
 class Control:
@@ -155,8 +155,9 @@ class Control:
         except CoreError as error:
             self._problem(share, not_activated(error), error)
             if isinstance(error, Invalid):
-                self._trial.failed(str(error))
+                self._blame(str(error))
                 self._judge(share, None)
+            self._heed_stop(share)
             return
         parts.lease.grant(self._run)
         parts.cloud_agents.begin(self._run)
@@ -170,7 +171,7 @@ class Control:
         late = self._parts.now() > float(str(share.memory["until"]))
         if late or self._parts.stop.is_set() or self._parts.lease.problem(True) is not None or run.outcome is not None:
             _log.warning("run %s: no first word: %s", run.name, run.outcome or "dead, silent or late")
-            self._trial.failed(run.outcome[1] if run.outcome is not None else "no first word")
+            self._blame(run.outcome[1] if run.outcome is not None else "no first word")
             share.memory["problem"] = "It did not start"
         self._look_at_cloud_agent(share)
         self._heed_stop(share)
@@ -187,9 +188,14 @@ class Control:
             problem = self._parts.lease.problem(self._parts.executor.busy)
             if problem is not None:
                 _log.warning("run %s: %s", run.name, problem)
-                self._trial.failed(problem)
+                self._blame(problem)
                 share.memory["problem"] = problem
             self._heed_stop(share)
+
+    def _blame(self, why: str) -> None:
+        """The RApp has failed; what fails once the person has stopped it is nobody's fault."""
+        if not self._stopping.given():
+            self._trial.failed(why)
 
     def _heed_stop(self, share: Subsystem) -> None:
         """What the person has stopped has no other problem."""
@@ -207,8 +213,8 @@ class Control:
         if outcome is not None and outcome[0] != "done":
             share.memory["problem"] = "It has failed"
             _log.warning("the dynamic agent failed: %s", outcome[1])
-            if self._parts.cloud_agents.problem() is None and not outcome[1].startswith(OTHERS_AWAY):
-                self._trial.failed(outcome[1])
+            if self._parts.cloud_agents.problem() is None and not outcome[1].startswith(OTHERS):
+                self._blame(outcome[1])
         self._look_at_cloud_agent(share)
         return outcome is not None or share.memory["problem"] is not None or self._parts.stop.is_set()
 
@@ -219,7 +225,9 @@ class Control:
         run = self._present()
         self._dismantling.destroy(run)
         self._run = None
-        self._heed_stop(share)
+        self._parts.launcher.prepare()
+        if share.memory.get("problem") is None:
+            self._heed_stop(share)
         self._judge(share, run)
 
     def _judge(self, share: Subsystem, run: Agent | None) -> None:

@@ -27,7 +27,7 @@ class Dismantling:
         self._quarantine = quarantine
 
     def destroy(self, run: Agent) -> None:
-        """Dismantle in the order of DESIGN section 3.5, kill, release the lease, warm the next spare.
+        """Dismantle in the order of DESIGN section 3.5, kill, release the lease.
 
         The robot is stopped before anything that takes time; a run that has not come to its end by itself, or that the person
         stops meanwhile, is not waited for.
@@ -48,21 +48,23 @@ class Dismantling:
         parts.executor.put_back()
         self._close_senses()
         self.end(run)
-        parts.launcher.prepare()
 
     def judge(self, run: Agent | None) -> str | None:
         """Whose fault it is, unless the robot is ending; gives what to say when the version before is back.
 
         A version that did not start has given way to the one before; one that fails again and again is not started for a while.
-        That the person has stopped a run is no failure.
+        A run that the person has stopped says nothing of it.
         """
         if self._parts.stop.is_set():
             return None
-        trial, stopped = self._trial, self._stopping.given()
-        if trial.why and not stopped:
+        trial = self._trial
+        if trial.why:
             self._quarantine.failed(trial.name, trial.version, trial.why)
-        elif run is not None and run.outcome is not None and run.outcome[:1] == ("done",):
-            self._quarantine.forget(trial.name)
+        elif not self._stopping.given() and run is not None and run.outcome is not None and run.outcome[:1] == ("done",):
+            try:
+                self._quarantine.forget(trial.name)
+            except OSError as error:
+                _log.warning("cannot keep that %s has come to its end: %s", trial.name, error)
         return trial.end(run.name if run else "", bool(run and run.first_word.is_set()))
 
     def _stop_cloud_agent(self, run: Agent) -> None:
@@ -74,10 +76,10 @@ class Dismantling:
 
     def end(self, run: Agent) -> None:
         """End its processes; what it printed is kept."""
-        self._stopping.end()
         parts = self._parts
         keep = parts.launcher.log_of(run.manifest) if run.manifest is not None else None
         run.end(parts.config.terminate, keep)
+        self._stopping.end()
         parts.trace.note("dynamic agent destroyed")
 
     def still(self) -> bool:

@@ -6,14 +6,17 @@ success, another version, `./rapp retry`, or the end of its time, after which th
 
 import json
 import logging
+import math
 import os
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from datetime import datetime
 
 from rapp_core.config import Config
 
 FILE = "quarantine.json"
+LATEST = 2.0**36  # s since 1970: the year 4147
 TEXT = 300  # characters kept of why it failed
 _log = logging.getLogger(__name__)
 
@@ -57,12 +60,15 @@ class Quarantine:
         more = failures - config.failures
         seconds = min(config.quarantine * 2.0 ** min(more, 64), config.quarantine_longest) if more >= 0 else 0.0
         entries[name] = Entry(version, failures, now, now + seconds, why[:TEXT])
-        self._write(entries)
+        try:
+            self._write(entries)
+        except OSError as error:
+            _log.warning("cannot keep which RApps fail: %s", error)
         if seconds:
             _log.warning("%s %s has failed %d times: not started for %.0f s", name, version, failures, seconds)
 
     def forget(self, name: str) -> bool:
-        """It has come to its end, or somebody has seen to it; gives whether there was anything to forget."""
+        """It has come to its end, or somebody has seen to it; gives whether there was anything to forget. Raises OSError."""
         entries = self._entries()
         known = entries.pop(name, None) is not None
         if known:
@@ -74,30 +80,33 @@ class Quarantine:
             read = json.loads(self._path.read_text("utf-8"))
             return {
                 str(name): Entry(
-                    str(entry["version"]), int(entry["failures"]), float(entry["since"]), float(entry["until"]), str(entry["why"])
+                    str(entry["version"]), int(entry["failures"]), _time(entry["since"]), _time(entry["until"]), str(entry["why"])
                 )
                 for name, entry in read.items()
             }
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except (OSError, ValueError, OverflowError, KeyError, TypeError, AttributeError) as error:
             _log.warning("cannot read %s: %r; no RApp is in quarantine", self._path, error)
             return {}
 
     def _write(self, entries: dict[str, Entry]) -> None:
         aside = self._path.with_suffix(".new")
-        try:
-            with aside.open("w", encoding="utf-8") as file:
-                json.dump({name: asdict(entry) for name, entry in entries.items()}, file)
-                file.flush()
-                os.fsync(file.fileno())
-            aside.replace(self._path)
-        except OSError as error:
-            _log.warning("cannot keep which RApps fail: %s", error)
+        with aside.open("w", encoding="utf-8") as file:
+            json.dump({name: asdict(entry) for name, entry in entries.items()}, file)
+            file.flush()
+            os.fsync(file.fileno())
+        aside.replace(self._path)
+
+
+def _time(value: float) -> float:
+    if not math.isfinite(value) or abs(value) > LATEST:
+        raise ValueError(f"{value} is no time")
+    return float(value)
 
 
 def _spoken(moment: float, now: float) -> str:
-    """A time of the day, as the robot says it."""
-    then = time.localtime(moment + 59)  # the first whole minute in which it is over
-    clock = time.strftime("%H:%M", then)
-    return clock if then.tm_yday == time.localtime(now).tm_yday else f"tomorrow {clock}"
+    """A time within a week, as the robot says it."""
+    then = datetime.fromtimestamp(moment + 59)  # the first whole minute in which it is over
+    days = (then.date() - datetime.fromtimestamp(now).date()).days
+    return then.strftime({0: "%H:%M", 1: "tomorrow %H:%M"}.get(days, "%A %H:%M"))

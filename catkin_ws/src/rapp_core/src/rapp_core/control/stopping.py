@@ -45,8 +45,8 @@ class Stopping:
 
     def end(self) -> None:
         """It has ended; no error when it had not begun."""
+        self._over.set()  # before the lock, which is held while the robot is asked
         with self._lock:
-            self._over.set()
             self._attention.ignore()
 
     def _feel(self, call: Call, over: threading.Event) -> None:
@@ -54,7 +54,7 @@ class Stopping:
         while not over.wait(PERIOD):
             try:
                 attends = attends or self._attend(call, over)
-                if self._robot.feeling.touched():
+                if self._robot.feeling.touched() and not over.is_set():
                     self._end(call)
                     self._robot.voice.hush()
                     return

@@ -46,8 +46,8 @@ class Channel:
             self._rest += piece
         line, _, self._rest = self._rest.partition(b"\n")
         try:
-            message = json.loads(line)
-        except ValueError as error:
+            message = _whole(json.loads(line))
+        except (ValueError, RecursionError) as error:
             raise Invalid("the dynamic agent sent a line that is no JSON") from error
         if not isinstance(message, dict) or not isinstance(message.get("type"), str):
             raise Invalid("the dynamic agent sent a message without a type")
@@ -58,3 +58,8 @@ class Channel:
         with contextlib.suppress(OSError):  # the other end may be gone already
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
+
+
+def _whole(message: Any) -> Any:
+    """The message with a question mark for each half of a character (a lone surrogate), which nobody could be sent."""
+    return json.loads(json.dumps(message, ensure_ascii=False).encode("utf-8", "replace"))

@@ -76,7 +76,7 @@ class RosHop:
         try:
             tell.asked()
             boot = self._boot
-            self._ask(name, job, json.dumps(arguments), timeout, cut)
+            self._ask(name, job, json.dumps(arguments), timeout)
             return self._wait(name, events, deadline, tell, boot, cut)
         except _Cut:
             tell.cut()
@@ -95,8 +95,11 @@ class RosHop:
             if time.monotonic() > until or self._stop.wait(STEP):
                 raise Unreachable(GONE)
 
-    def _ask(self, name: str, job: str, arguments: str, timeout: float, cut: Cut) -> None:
-        """Call the link's service in a thread of its own: rospy knows no time-out of a call."""
+    def _ask(self, name: str, job: str, arguments: str, timeout: float) -> None:
+        """Call the link's service in a thread of its own: rospy knows no time-out of a call.
+
+        Not to be cut: the link knows nothing yet of the job, so a cancel would come before it.
+        """
         answer: queue.Queue[Any] = queue.Queue(maxsize=1)
 
         def call() -> None:
@@ -109,7 +112,6 @@ class RosHop:
         until = time.monotonic() + ASKING
         outcome: Any = None
         while outcome is None:
-            _check(cut)
             with contextlib.suppress(queue.Empty):
                 outcome = answer.get(timeout=STEP)
             if outcome is None and time.monotonic() > until:
