@@ -4,6 +4,7 @@ What lies in the system's memory is taken on the loop; what would wait for the d
 """
 
 import asyncio
+import errno
 import os
 import socket
 from collections.abc import Callable
@@ -15,10 +16,16 @@ from rapp_hop.protocol import OpenFile
 PIECE = 256 * 1024  # bytes
 _WINDOW = 16 * 2**20  # bytes that are looked for in memory at once
 _AT_ONCE = 2**20  # bytes that one connection may take before others have their turn
+_GONE = {errno.EPIPE, errno.ECONNRESET, errno.ECONNABORTED, errno.ENOTCONN, errno.ESHUTDOWN, errno.ETIMEDOUT}  # the peer has
+_UNABLE = {errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP}  # this file system knows no sendfile
 
 
 class TooShortError(Exception):
     """A file became shorter while it was sent."""
+
+
+class _UnableError(Exception):
+    """The kernel does not send this file; none of it has gone."""
 
 
 async def send_file(stream: BaseIOStream, part: OpenFile, patience: float) -> None:
@@ -28,11 +35,15 @@ async def send_file(stream: BaseIOStream, part: OpenFile, patience: float) -> No
     :raises StreamClosedError: when the peer has gone
     :raises TimeoutError: out of patience
     :raises TooShortError: when not all of it could be sent
+    :raises OSError: when it cannot be read
     """
     if isinstance(stream, SSLIOStream) or not isinstance(stream, IOStream):
         await _in_pieces(stream, part, patience)
-    else:
+        return
+    try:
         await _by_the_kernel(stream, part, patience)
+    except _UnableError:
+        await _in_pieces(stream, part, patience)
 
 
 async def _in_pieces(stream: BaseIOStream, part: OpenFile, patience: float) -> None:
@@ -72,6 +83,7 @@ class _Pump:
         self._line = os.dup(line.fileno())
         self._file = part.file.fileno()
         self._start, self._end = start, end
+        self._untouched = start == part.start
         self._loop = asyncio.get_running_loop()
         self._done: asyncio.Future[None] = self._loop.create_future()
 
@@ -94,14 +106,20 @@ class _Pump:
         except BlockingIOError:
             return
         except OSError as error:
-            self._done.set_exception(StreamClosedError(error))
+            self._done.set_exception(self._meaning(error))
             return
         self._start += count
+        self._untouched = False
         self.on_progress()
         if not count:
             self._done.set_exception(TooShortError())
         elif self._start == self._end:
             self._done.set_result(None)
+
+    def _meaning(self, error: OSError) -> Exception:
+        if error.errno in _GONE:
+            return StreamClosedError(error)
+        return _UnableError() if error.errno in _UNABLE and self._untouched else error
 
 
 async def _brought(part: OpenFile, start: int, count: int) -> None:

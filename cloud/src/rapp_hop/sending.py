@@ -59,6 +59,11 @@ async def _send_file(
         except TooShortError:
             _log.error("a file of an answer became shorter while it was sent")
             stream.close()
+        except (StreamClosedError, TimeoutError):
+            raise
+        except OSError as error:
+            _log.error("a file of an answer cannot be read: %s", error.strerror)
+            stream.close()
 
 
 async def _send_stream(

@@ -1,6 +1,7 @@
 """Parts of files onto lines of the kernel's: all of it, in order, or the reason; and no descriptor is left."""
 
 import asyncio
+import errno
 import os
 import random
 import socket
@@ -12,7 +13,8 @@ import pytest
 from tornado.iostream import BaseIOStream, IOStream, PipeIOStream, StreamClosedError
 
 from rapp_hop.file_sending import TooShortError, send_file
-from rapp_hop.protocol import OpenFile
+from rapp_hop.protocol import OpenFile, WireAnswer
+from rapp_hop.sending import send
 
 SIZE = 20 * 2**20 + 1  # bytes: more than a line holds, and than is looked for in memory at once
 PATIENCE = 30.0  # s
@@ -62,6 +64,13 @@ def read_all(end: int, count: int) -> bytes:
         assert piece, "the line ended early"
         found += piece
     return bytes(found)
+
+
+def read_to_the_end(end: int) -> int:
+    count = 0
+    while piece := os.read(end, 2**20):
+        count += len(piece)
+    return count
 
 
 @pytest.mark.parametrize("kind", ["socket", "pipe"])
@@ -117,6 +126,58 @@ def test_a_stream_that_is_closed_meanwhile(file: Path) -> None:
             await send_file(stream, OpenFile(opened, 0, SIZE), PATIENCE)
 
     over("socket", test)
+
+
+def failing(number: int, good: int = 0) -> Callable[..., int]:
+    """A sendfile that fails after some good calls."""
+    sendfile, calls = os.sendfile, iter(range(good))
+
+    def send(*arguments: int) -> int:
+        if next(calls, None) is None:
+            raise OSError(number, os.strerror(number))
+        return sendfile(*arguments)
+
+    return send
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_a_file_that_the_kernel_does_not_send_goes_in_pieces(file: Path, monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    async def test(stream: BaseIOStream, end: int) -> None:
+        monkeypatch.setattr(os, "sendfile", failing(number))
+        with file.open("rb") as opened:
+            got = asyncio.create_task(asyncio.to_thread(read_all, end, 2**20))
+            await send_file(stream, OpenFile(opened, 5, 2**20), PATIENCE)
+            assert await got == file.read_bytes()[5 : 5 + 2**20]
+
+    over("socket", test)
+
+
+@pytest.mark.parametrize(("number", "good"), [(errno.EIO, 0), (errno.EIO, 1), (errno.EINVAL, 1)])
+def test_a_file_that_cannot_be_read_further_is_said_and_ends_the_connection(
+    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, number: int, good: int
+) -> None:
+    async def test(stream: BaseIOStream, end: int) -> None:
+        monkeypatch.setattr(os, "sendfile", failing(number, good))
+        reading = asyncio.create_task(asyncio.to_thread(read_to_the_end, end))
+        await send(stream, WireAnswer(200, "text/plain", OpenFile(file.open("rb"), 0, SIZE)), True, False, "1.1", PATIENCE)
+        assert stream.closed()
+        assert await reading < SIZE
+
+    over("socket", test)
+    assert [record.getMessage() for record in caplog.records] == [f"a file of an answer cannot be read: {os.strerror(number)}"]
+
+
+@pytest.mark.parametrize("number", [errno.EPIPE, errno.ECONNRESET, errno.ETIMEDOUT])
+def test_a_peer_that_goes_is_no_fault_of_the_file(
+    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, number: int
+) -> None:
+    async def test(stream: BaseIOStream, end: int) -> None:
+        monkeypatch.setattr(os, "sendfile", failing(number))
+        await send(stream, WireAnswer(200, "text/plain", OpenFile(file.open("rb"), 0, SIZE)), True, False, "1.1", PATIENCE)
+        assert stream.closed()
+
+    over("socket", test)
+    assert not caplog.records
 
 
 @pytest.mark.parametrize("kind", ["socket", "pipe"])
