@@ -109,6 +109,7 @@ def test_the_robot_is_still_while_its_core_agent_stands_still_and_is_watched_on(
             robot.call("ALSpeechRecognition", "setVocabulary", ["e-mail"], False)
     finally:
         core.process.send_signal(signal.SIGCONT)
+    wait_for(lambda: "guard INFO the core agent goes on" in (home.parent / "rapp_core.log").read_text())  # it has stopped twice
     assert guard_of(core.process.pid) == guard
     robot.start("ALMotion", "angleInterpolation", "HeadYaw", -1.0, LONGEST, True)
     wait_for(lambda: moving(robot))
