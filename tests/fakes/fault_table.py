@@ -46,22 +46,32 @@ class FaultTable:
         return cells
 
     def _column(self, folder: Path, packages: list[Path], fault: Fault) -> Cells:
-        """All states with one fault, on one robot; a case that fails gives the next one a new robot."""
+        """All states with one fault, on one robot; a case that fails gives the next one a new robot.
+
+        A robot that does not serve at first is the failure of all cases that were to come; one that does not end, of the last one.
+        """
         cells: Cells = {}
         states = list(self.states)
         while states:
             robot = WholeRobot(folder / f"robot-{len(states)}", packages)
-            with whole_robot(robot, *self.processes):
-                serve(robot, self.patience)
-                while states:
-                    state = states.pop(0)
-                    try:
-                        cells[(state, *fault)] = self.suffer(robot, state, *fault)
-                    except Exception as error:  # noqa: BLE001 - whatever it is, it is this cell's, and the table goes on
-                        story = f"{type(error).__name__}: {error}\n{robot.story(max(0, len(robot.seen) - 80))}"
-                        cells[(state, *fault)] = Cell(0.0, 0.0, story[-12000:])
-                        break
+            try:
+                with whole_robot(robot, *self.processes):
+                    serve(robot, self.patience)
+                    self._suffered(robot, fault, states, cells)
+            except Exception as error:  # noqa: BLE001 - whatever it is, it is this column's, and the table goes on
+                cells |= dict.fromkeys([(state, *fault) for state in states or self.states[-1:]], _failed(robot, error))
+                break
         return cells
+
+    def _suffered(self, robot: WholeRobot, fault: Fault, states: list[str], cells: Cells) -> None:
+        """Take one state after the other off the list, until a case fails."""
+        while states:
+            state = states.pop(0)
+            try:
+                cells[(state, *fault)] = self.suffer(robot, state, *fault)
+            except Exception as error:  # noqa: BLE001 - whatever it is, it is this cell's, and the table goes on
+                cells[(state, *fault)] = _failed(robot, error)
+                return
 
     def show(self, title: str, cells: Cells) -> None:
         """Print it."""
@@ -72,6 +82,11 @@ class FaultTable:
             row = [cells[(state, *fault)] for fault in self.faults]
             texts = ["failed" if cell.problem else f"{cell.listening:.1f} / {cell.well:.1f}" for cell in row]
             print(f"{state:{width}}" + "".join(f"{text:>19}" for text in texts))
+
+
+def _failed(robot: WholeRobot, error: Exception) -> Cell:
+    story = f"{type(error).__name__}: {error}\n{robot.story(max(0, len(robot.seen) - 80))}"
+    return Cell(0.0, 0.0, story[-12000:])
 
 
 def serve(robot: WholeRobot, patience: float = PATIENCE) -> Seen:
