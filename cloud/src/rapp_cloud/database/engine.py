@@ -3,6 +3,7 @@
 import logging
 import os
 import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +20,7 @@ from rapp_hop.errors import Invalid, Refused, Unreachable
 
 FILE = "platform.sqlite"
 WAIT = 5.0  # seconds for a lock, or for a server to answer
+_AGAIN = 0.02  # seconds between two tries for what SQLite itself does not wait for
 _STATEMENT = 20.0  # seconds of one statement (PostgreSQL)
 _MIGRATIONS = Path(__file__).parent / "migrations"
 _MIGRATING = 7_277_001  # any number: the advisory lock of who migrates (PostgreSQL)
@@ -44,7 +46,7 @@ class Database:
         if parsed.drivername == "sqlite":
             self._file: Path | None = Path(parsed.database or "")
             self._engine = sa.create_engine(parsed, connect_args={"timeout": wait}, hide_parameters=True)
-            sa.event.listen(self._engine, "connect", _prepare_sqlite)
+            sa.event.listen(self._engine, "connect", lambda connection, _record: _prepare_sqlite(connection, wait))
             sa.event.listen(self._engine, "begin", _begin_sqlite)
         elif parsed.drivername == "postgresql+psycopg":
             self._file = None
@@ -115,16 +117,34 @@ class Database:
     def _make_file(self) -> None:
         if self._file is not None:
             try:
-                # SQLite gives its other files the mode of this one.
-                os.close(os.open(self._file, os.O_CREAT | os.O_CLOEXEC, 0o600))
+                # SQLite gives its other files the mode of this one. To open one that is there would undo our locks on it.
+                os.close(os.open(self._file, os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600))
+            except FileExistsError:
+                return
             except OSError as error:
                 raise Refused(f"cannot use the database {self._file}: {error.strerror}, run rapp_cloud init first") from None
 
 
-def _prepare_sqlite(connection: Any, _record: Any) -> None:
+def _prepare_sqlite(connection: Any, wait: float) -> None:
     connection.isolation_level = None  # we begin transactions ourselves
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
+    until = time.monotonic() + wait
+    while not _has_log(connection):
+        if time.monotonic() > until:
+            break  # whoever uses the connection is told that it is locked
+        time.sleep(_AGAIN)
+    for pragma in ("synchronous=FULL", "foreign_keys=ON"):
         connection.execute(f"PRAGMA {pragma}")
+
+
+def _has_log(connection: Any) -> bool:
+    """Have changes written ahead; False while another connection does the same, for which SQLite does not wait."""
+    try:
+        connection.execute("PRAGMA journal_mode=WAL")
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY:
+            raise
+        return False
+    return True
 
 
 def _begin_sqlite(connection: sa.Connection) -> None:
