@@ -20,7 +20,7 @@ class Room:
     def __init__(self) -> None:
         self.fake = FakeRobot()
         self.voice = OwnVoice(self.fake.robot.voice, Config(), self.fake.body.clock.now)
-        self.attention = Attention(self.fake.robot.ears, "stop", 0.5, self.voice)
+        self.attention = Attention(self.fake.robot.ears, "stop", Config(), self.voice, self.fake.body.clock.now)
         self.called: list[str] = []
         self.heard: list[Word | Sound] = []
 
@@ -102,6 +102,15 @@ def test_a_word_that_is_not_sure_is_nobody_s(room: Room) -> None:
     assert (room.words(), room.called) == ([], [])
 
 
+@pytest.mark.parametrize(("seconds", "called"), [(0.9, ["stop"]), (2.0, [])])
+def test_within_a_sentence_the_word_is_part_of_that(room: Room, seconds: float, called: list[str]) -> None:
+    """Who dictates "please stop by the shop" does not stop the robot."""
+    room.attend()
+    room.fake.person_says("stop", SURE, seconds)
+    room.fake.body.clock.advance(seconds + 1.0)
+    assert room.called == called
+
+
 def test_what_the_robot_says_itself_is_not_the_person(room: Room) -> None:
     room.attend()
     room.fake.robot.voice.say = lambda *_: room.say("stop")  # type: ignore[method-assign]
@@ -163,7 +172,7 @@ def test_a_word_that_the_robot_does_not_take_takes_nobody_else_s(room: Room, mon
 
 
 def test_in_a_language_without_the_word_nothing_is_listened_for(room: Room) -> None:
-    deaf = Attention(room.fake.robot.ears, STOP.get("xx"), 0.5, room.voice)
+    deaf = Attention(room.fake.robot.ears, STOP.get("xx"), Config(), room.voice)
     deaf.attend(room.called.append)
     deaf.ignore()
     assert room.fake.journal == []

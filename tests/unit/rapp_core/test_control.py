@@ -52,7 +52,7 @@ class Home:
         self.stop = self.clock.event()
         listening = folder / "listening"
         voice = OwnVoice(self.fake.robot.voice, self.config, self.clock.now)
-        attention = Attention(self.fake.robot.ears, "stop", self.config.stop_threshold, voice)
+        attention = Attention(self.fake.robot.ears, "stop", self.config, voice, self.fake.body.clock.now)
         robot = replace(self.fake.robot, voice=voice, ears=attention)
         context = Context(robot, self.config, self.trace, listening, cut=self.stop, now=self.clock.now)
         self.executor = Executor(context)

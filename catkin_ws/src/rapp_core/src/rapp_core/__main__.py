@@ -78,7 +78,7 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     connection = Connection(config.robot, config.naoqi_timeout)
     nao = robot(connection, config)
     voice = OwnVoice(nao.voice, config)
-    attention = Attention(nao.ears, STOP.get(config.language), config.stop_threshold, voice)
+    attention = Attention(nao.ears, STOP.get(config.language), config, voice)
     nao = replace(nao, voice=voice, ears=attention)
     trace, states, lease = Trace(), StatePublisher(), Lease(config)
     trace.listen(states.tell)

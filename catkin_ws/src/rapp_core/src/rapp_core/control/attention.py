@@ -13,6 +13,8 @@ from rapp_core.config import Config
 from rapp_core.errors import CoreError, Unreachable
 from rapp_core.ports import Ears, Sound, Voice, Word
 
+JUDGED = 5.0  # s the recogniser takes at most; a word told later has another sound
+
 Heard = Callable[[Word | Sound], None]
 
 
@@ -50,18 +52,27 @@ class OwnVoice:
 
 
 class Attention:
-    """A `ports.Ears` for everybody else; from `attend` to `ignore` it listens for the core agent's word as well."""
+    """A `ports.Ears` for everybody else; from `attend` to `ignore` it listens for the core agent's word as well.
 
-    def __init__(self, ears: Ears, word: str | None, threshold: float, voice: OwnVoice) -> None:
+    The word counts when it is said alone: within a sentence, such as one that a RApp records, it is part of that.
+    """
+
+    def __init__(
+        self, ears: Ears, word: str | None, config: Config, voice: OwnVoice, now: Callable[[], float] = time.monotonic
+    ) -> None:
         """Prepare.
 
         :param word: the core agent's; None: there is none in the person's language
-        :param threshold: probability from which it counts; higher than that of other words, for a wrong one ends a RApp
         """
         self._ears = ears
         self._word = word
-        self._threshold = threshold
+        self._threshold = config.stop_threshold
+        self._longest = config.long_command
         self._voice = voice
+        self._now = now
+        self._begun: float | None = None  # when the present sound did
+        self._ended = float("-inf")  # when the last one did
+        self._length = 0.0  # s of that
         self._lock = threading.Lock()
         self._words: list[str] = []  # of whoever else listens, or is about to
         self._heard: Heard | None = None  # whoever else listens
@@ -133,8 +144,21 @@ class Attention:
 
     def _take(self, item: Word | Sound) -> None:
         heard, called = self._heard, self._called
+        if isinstance(item, Sound):
+            self._measure(item)
         if called is None or not isinstance(item, Word) or not self._is_own(item.text):
             if heard is not None:
                 heard(item)
-        elif item.probability >= self._threshold and not self._voice.heard:
+        elif item.probability >= self._threshold and not self._voice.heard and self._alone():
             called(item.text)
+
+    def _measure(self, sound: Sound) -> None:
+        if sound.begun:
+            self._begun = self._now()
+        elif self._begun is not None:
+            self._ended = self._now()
+            self._length, self._begun = self._ended - self._begun, None
+
+    def _alone(self) -> bool:
+        """Whether its sound was short enough for the word, which may be told before the end of it, or without any."""
+        return self._begun is not None or self._length < self._longest or self._now() - self._ended > JUDGED

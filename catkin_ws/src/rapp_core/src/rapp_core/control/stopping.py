@@ -51,13 +51,14 @@ class Stopping:
 
     def _feel(self, call: Call, over: threading.Event) -> None:
         attends = False
-        while not over.wait(PERIOD):
+        while not over.is_set():
             try:
-                attends = attends or self._attend(call, over)
                 if self._robot.feeling.touched() and not over.is_set():
                     self._end(call)
                     self._robot.voice.hush()
                     return
+                if not over.wait(PERIOD):
+                    attends = attends or self._attend(call, over)
             except CoreError as error:
                 _log.info("%s", error)
                 attends = attends and not isinstance(error, Unreachable)
