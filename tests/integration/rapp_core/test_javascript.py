@@ -139,19 +139,24 @@ await new Promise((resolve) => ros.on("connection", resolve));
 const say = new ROSLIB.Service({ ros, name: "/rapp_say", serviceType: "rapp_msgs/Say" });
 const said = await new Promise((resolve, reject) => say.callService({ text: "by roslib", language: "en" }, resolve, reject));
 const client = new ROSLIB.ActionClient({ ros, serverName: "/rapp_move_to", actionName: "rapp_msgs/MoveToAction" });
-const goal = new ROSLIB.Goal({ actionClient: client, goalMessage: { x: 1, y: 0, theta: 0 } });
 let feedback = 0;
-goal.on("feedback", () => { feedback += 1; });
-const result = new Promise((resolve) => goal.on("result", resolve));
-goal.send();
-console.log("FACTS " + JSON.stringify([said.success, (await result).success, feedback]));
+let done;
+while (feedback === 0) { // the first goal's may come before its topic is connected
+  const goal = new ROSLIB.Goal({ actionClient: client, goalMessage: { x: 1, y: 0, theta: 0 } });
+  goal.on("feedback", () => { feedback += 1; });
+  const result = new Promise((resolve) => goal.on("result", resolve));
+  goal.send();
+  done = await result;
+  await this.pause(0.1);
+}
+console.log("FACTS " + JSON.stringify([said.success, done.success]));
 """
     package = workshop.write(body, MOVER, "javascript")
     shutil.copytree(roslibjs / "node_modules", package / "node_modules")
     run = workshop.activate(package)
     text, outcome = workshop.finish(run)
     assert outcome == "done", text
-    assert "FACTS [true,true,1]" in text
+    assert "FACTS [true,true]" in text
     goal = core.notes("goal")[-1]
     assert (goal["caller"], goal["secret"]) == (f"/dynamic_agent_{run.name}", run.token)
 
