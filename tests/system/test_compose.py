@@ -42,6 +42,12 @@ def say(composition: Composition, robot: str, *words: str) -> str:
     return said.stdout
 
 
+def send(composition: Composition, robot: str, message: str) -> None:
+    """Somebody sends Elizabeth a mail, and hears that it is sent."""
+    shown = say(composition, robot, "e-mail", "Elizabeth", message)
+    assert "your message to Elizabeth is sent" in shown, f"{shown}\n{composition.logs()}"
+
+
 def on_both(composition: Composition, *words: str) -> dict[str, str]:
     """The same is said to both robots at once."""
     told: dict[str, str] = {}
@@ -120,13 +126,13 @@ def test_a_robot_cut_off_in_the_middle_keeps_its_mail_and_sends_it_once_healed(c
             shown += talk.stdout.read()
             assert talk.wait(180) == 0, shown
             assert "is sent”" not in shown
-            assert "your message to Elizabeth is sent" in say(composition, "nao2", "e-mail", "Elizabeth", "this one has not")
+            send(composition, "nao2", "this one has not")
             assert len(mails(composition, tmp_path / "meanwhile")) == before + 1
         finally:
             composition.network("connect", "nao1", "one")
     looks = count()
     composition.until(lambda: len(mails(composition, tmp_path / f"look{next(looks)}")) > before + 1, "the mail that waited")
-    assert "your message to Elizabeth is sent" in say(composition, "nao1", "e-mail", "Elizabeth", "this one comes after it")
+    send(composition, "nao1", "this one comes after it")
     assert len(mails(composition, tmp_path / "after")) == before + 3
 
 
@@ -146,7 +152,7 @@ def test_a_container_that_is_killed_serves_again_once_it_is_started(composition:
     composition.compose("kill", service)
     composition.compose("start", service)
     composition.healthy(*SERVICES)
-    assert "your message to Elizabeth is sent" in say(composition, "nao1", "e-mail", "Elizabeth", f"{service} is back")
+    send(composition, "nao1", f"{service} is back")
     assert len(mails(composition, tmp_path / "after")) == before + 1
 
 
