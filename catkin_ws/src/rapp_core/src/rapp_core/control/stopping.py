@@ -50,19 +50,22 @@ class Stopping:
             self._attention.ignore()
 
     def _feel(self, call: Call, over: threading.Event) -> None:
-        attends = False
+        attends, feels = False, True
         while not over.is_set():
             try:
-                if self._robot.feeling.touched() and not over.is_set():
+                if feels and self._robot.feeling.touched() and not over.is_set():
                     self._end(call)
                     self._robot.voice.hush()
                     return
                 if not over.wait(PERIOD):
                     attends = attends or self._attend(call, over)
-            except CoreError as error:
+            except Unreachable as error:
                 _log.info("%s", error)
-                attends = attends and not isinstance(error, Unreachable)
+                attends = False
                 over.wait(RETRY)
+            except CoreError as error:
+                _log.info("only a word stops the robot: %s", error)
+                feels = False
 
     def _attend(self, call: Call, over: threading.Event) -> bool:
         """Listen for the word; what this robot cannot hear is not asked for again. Raises Unreachable."""
