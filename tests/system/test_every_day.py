@@ -149,7 +149,7 @@ def test_down_leaves_nothing_and_may_be_said_twice(desk: Desk) -> None:
 
 def test_a_robot_that_cannot_be_reached_is_said_and_what_was_started_is_ended(desk: Desk) -> None:
     desk.done("down")
-    result = desk.rapp("up", "--robot", "tcp://127.0.0.1:1", "--timeout", "3")
+    result = desk.rapp("up", "--robot", "tcp://127.0.0.1:1", "--timeout", "12")
     assert result.returncode == 1
     assert "cannot reach NAOqi" in result.stderr  # the end of the core agent's log
     desk.assert_nothing_is_left()
