@@ -9,6 +9,7 @@ import pytest
 
 from rapp_core.config import Config
 from rapp_core.control.quarantine import FILE, Quarantine
+from rapp_core.files import aside_of
 
 NOON = time.mktime((2026, 11, 21, 12, 0, 0, 0, 0, -1))
 
@@ -143,7 +144,7 @@ def test_what_cannot_be_written_is_no_matter(tmp_path: Path) -> None:
 
 def test_what_cannot_be_forgotten_is_told(home: Home) -> None:
     home.fail(3)
-    (home.config.home / FILE).with_suffix(".new").mkdir()
+    aside_of(home.config.home / FILE).mkdir()
     with pytest.raises(OSError):
         home.quarantine.forget("clock")
     assert home.refusal() is not None

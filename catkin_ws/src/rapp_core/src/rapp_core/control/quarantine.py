@@ -7,13 +7,13 @@ success, another version, `./rapp retry`, or the end of its time, after which th
 import json
 import logging
 import math
-import os
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime
 
 from rapp_core.config import Config
+from rapp_core.files import write_whole
 
 FILE = "quarantine.json"
 LATEST = 2.0**36  # s since 1970: the year 4147
@@ -91,12 +91,7 @@ class Quarantine:
             return {}
 
     def _write(self, entries: dict[str, Entry]) -> None:
-        aside = self._path.with_suffix(".new")
-        with aside.open("w", encoding="utf-8") as file:
-            json.dump({name: asdict(entry) for name, entry in entries.items()}, file)
-            file.flush()
-            os.fsync(file.fileno())
-        aside.replace(self._path)
+        write_whole(self._path, json.dumps({name: asdict(entry) for name, entry in entries.items()}).encode())
 
 
 def _time(value: float) -> float:

@@ -6,7 +6,6 @@ that is there; the link keeps it until the platform has it. So neither the end o
 
 import json
 import logging
-import os
 import secrets
 import threading
 import time
@@ -17,6 +16,7 @@ from typing import Any
 
 from rapp_core.control.stopping import BY_PERSON
 from rapp_core.errors import CoreError, Unreachable
+from rapp_core.files import write_whole
 from rapp_core.manifest import Manifest
 from rapp_core.ports import Agent, Agents, Hop, Told
 from rapp_core.trace import Happening, Trace
@@ -163,12 +163,7 @@ class RunReports:
     def _write(self, report: dict[str, Any]) -> None:
         self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         path = self._folder / f"{time.time_ns()}-{report['run']}.json"
-        aside = path.with_suffix(".new")
-        with aside.open("w", encoding="utf-8") as file:
-            json.dump(report, file)
-            file.flush()
-            os.fsync(file.fileno())
-        aside.replace(path)
+        write_whole(path, json.dumps(report).encode())
         for old in self._waiting()[:-KEPT]:
             old.unlink(missing_ok=True)
 

@@ -1,12 +1,12 @@
 """rapp_keep: files that a RApp leaves to the person; all else that it writes is in memory and ends with its run."""
 
-import os
 import re
 import threading
 from pathlib import Path
 
 from rapp_core.config import Config
 from rapp_core.errors import Invalid, Refused, Unreachable
+from rapp_core.files import aside_of, write_whole
 from rapp_core.ports import Agent
 
 BLOCK = 4096  # bytes that a file takes at least: many small ones count, too
@@ -32,7 +32,7 @@ class Keepsakes:
             with self._lock:
                 folder.mkdir(parents=True, exist_ok=True)
                 self._check_size(folder, name, len(data))
-                return _write(folder / name, data)
+                return write_whole(folder / name, data)
         except OSError as error:
             raise Unreachable(f"cannot keep {name}: {error.strerror}; see the disk of {self._folder}") from error
 
@@ -40,24 +40,11 @@ class Keepsakes:
         limits = self._limits
         if size > limits.kept_file:
             raise Refused(f"cannot keep {name}: it has {size} bytes, {limits.kept_file} are allowed; make it smaller")
-        others = sum(_taken(file.stat().st_size) for file in folder.iterdir() if file.name not in (name, _aside(name)))
+        own = (folder / name, aside_of(folder / name))
+        others = sum(_taken(file.stat().st_size) for file in folder.iterdir() if file not in own)
         if others + _taken(size) > limits.kept:
             raise Refused(f"cannot keep {name}: {folder} would have more than {limits.kept} bytes; use an older file's name again")
 
 
 def _taken(size: int) -> int:
     return max(BLOCK, size)
-
-
-def _aside(name: str) -> str:
-    return f".{name}.new"
-
-
-def _write(path: Path, data: bytes) -> Path:
-    """Write aside, then rename: nobody sees half a file."""
-    aside = path.with_name(_aside(path.name))
-    with aside.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    return aside.replace(path)
