@@ -8,9 +8,11 @@ import errno
 import io
 import json
 import os
+import shutil
 import signal
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 TAKES_SPACE = ("mkdir", "open", "fsync", "rename", "replace", "symlink", "write", "utime", "chmod")
@@ -91,3 +93,22 @@ def in_child(work: Callable[[], dict[str, Any]]) -> dict[str, Any] | None:
         text = pipe.read()
     os.waitpid(child, 0)
     return dict(json.loads(text)) if text else None
+
+
+def one_try(step: int, tried: Callable[[], dict[str, Any]], recovered: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """What came of a try cut off at a step, and of starting again after it, each in a process of its own."""
+    came = in_child(tried)
+    return {"step": step, "killed": came is None, **(came or {}), **(in_child(recovered) or {"fault": "killed twice"})}
+
+
+def every_step(begin: Path, work: Path, cut_off: Callable[[int], dict[str, Any]]) -> None:
+    """Cut off at one step after the other, each time in a copy of `begin`, until it comes to its end; prints what came of each."""
+    step = 0
+    while True:
+        shutil.copytree(begin, work, symlinks=True)
+        told = cut_off(step)
+        shutil.rmtree(work)
+        print(json.dumps(told), flush=True)
+        if "fault" in told or (not told["killed"] and told["steps"] <= step):
+            return
+        step += 1

@@ -11,7 +11,6 @@ from fakes.faulty_cloud import FaultyCloud
 from fakes.faulty_mail import FaultyMail
 from fakes.whole_robot import PATIENCE, Seen, WholeRobot, entered
 
-AGAIN = 0.25  # s between two tries to be heard
 BOUND = 10.0  # s to say what failed and to listen again, once the fault is known to the robot
 
 
@@ -46,15 +45,6 @@ class RobotBehindFaults(WholeRobot):
     def ask(self, keyword: str, state: str = "s4") -> Seen:
         """See `WholeRobot.ask`; the microphone is text-fed, so a word costs nothing and can be said often."""
         return self.say_until(keyword, entered(state), len(self.seen))
-
-    def say_until(self, text: str, wanted: Callable[[Seen], bool], since: int) -> Seen:
-        """The person says a text again and again until something has happened."""
-        deadline = time.monotonic() + PATIENCE
-        while time.monotonic() < deadline:
-            self.say(text)
-            with suppress(AssertionError):
-                return self.until(wanted, since, AGAIN)
-        raise AssertionError(f"{text!r} was not heard\n{self.story(since)}")
 
     def command(self, text: str) -> int:
         """The person says a whole sentence, again when it was not heard; gives where the story of it begins."""

@@ -24,6 +24,7 @@ from rapp_core.robot.naoqi.connection import Connection
 from rapp_core.robot_processes.child import Child
 
 PATIENCE = 30.0  # s for anything that has to happen
+AGAIN = 0.25  # s between two tries to be heard
 NEVER = threading.Event()
 ORDER = ("roscore", "mail", "cloud", "nao_sim", "rosbridge", "link", "core_agent")
 WATCHER = """
@@ -214,6 +215,15 @@ class WholeRobot:
     def say(self, text: str) -> None:
         """The person says a text once."""
         self.room("micText", text)
+
+    def say_until(self, text: str, wanted: Callable[[Seen], bool], since: int) -> Seen:
+        """The person says a text again and again until something has happened."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            self.say(text)
+            with suppress(AssertionError):
+                return self.until(wanted, since, AGAIN)
+        raise AssertionError(f"{text!r} was not heard\n{self.story(since)}")
 
     def ask(self, keyword: str, state: str = "s4") -> Seen:
         """The person says a keyword again and again until the core agent has entered `state`: it is deaf between two rounds."""

@@ -6,7 +6,6 @@ That a walk ends in time, and that the word is heard as sound, is seen by `test_
 
 import json
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,13 +13,12 @@ from pathlib import Path
 import pytest
 
 from fakes.rapps import write_four_agent_rapp, write_rapp
-from fakes.whole_robot import PATIENCE, Seen, WholeRobot, entered, listening_after, whole_robot
+from fakes.whole_robot import Seen, WholeRobot, entered, listening_after, whole_robot
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 STOPPED = "You have stopped it"
 HEAD = "Device/SubDeviceList/Head/Touch/Middle/Sensor/Value"
-AGAIN = 0.3  # s until the person says the word once more
 ENTRY = {
     "lazy": "communication.rapp_say('here')\nself.pause(60)",
     "listener": "communication.rapp_recognize(['yes', 'no'], 60.0)",
@@ -80,18 +78,8 @@ def by_hand(robot: WholeRobot, since: int) -> Seen:
         lift_hand(robot)
 
 
-def say_until(robot: WholeRobot, word: str, wanted: Callable[[Seen], bool], since: int) -> Seen:
-    """The person says a word until something tells that the robot has heard it."""
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        robot.say(word)
-        with suppress(AssertionError):
-            return robot.until(wanted, since, AGAIN)
-    raise AssertionError(f"{word!r} was not heard\n{robot.story(since)}")
-
-
 def by_word(robot: WholeRobot, since: int) -> Seen:
-    return say_until(robot, "stop", said(STOPPED), since)
+    return robot.say_until("stop", said(STOPPED), since)
 
 
 def command(robot: WholeRobot, text: str) -> None:
@@ -203,7 +191,7 @@ def test_l11_s9_a_rapp_that_waits_for_the_platform_is_ended(robot: WholeRobot) -
     robot.ask("caller")
     robot.until(said("here"), since)
     with platform_stands_still(robot):
-        begun = say_until(robot, "go", lambda seen: seen.detail == "core->link call profile", since)
+        begun = robot.say_until("go", lambda seen: seen.detail == "core->link call profile", since)
         robot.until(listening_after(by_word(robot, since)), since)
     assert not any(seen.detail == "link->core reply call profile" for seen in robot.seen[robot.seen.index(begun) :])
     robot.until_only_the_spare_runs()

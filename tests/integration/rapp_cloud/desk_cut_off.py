@@ -4,8 +4,6 @@ Words: a folder to begin with, a working folder, the operation, "killed" or "ful
 offer after the cut and the platform's next start, and after the operation was done again.
 """
 
-import json
-import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +12,7 @@ from typing import Any
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from securesystemslib.signer import CryptoSigner
 
-from fakes.cutting import cutter, in_child, put_in
+from fakes.cutting import cutter, every_step, one_try, put_in
 from fakes.publisher import Publisher
 from fakes.store_folder import StoreFolder
 from rapp_cloud.shelf import Shelf
@@ -103,21 +101,12 @@ def cut_off(folder: Path, operation: str, how: str, step: int) -> dict[str, Any]
         after = look(shelf, folder)
         return {"after": after, "again": done_again(shelf, folder, operation), "end": look(shelf, folder)}
 
-    came = in_child(tried)
-    return {"step": step, "killed": came is None, **(came or {}), **(in_child(recovered) or {"fault": "killed twice"})}
+    return one_try(step, tried, recovered)
 
 
 def main(begin: Path, work: Path, operation: str, how: str) -> None:
     """Go on until the operation comes to its end."""
-    step = 0
-    while True:
-        shutil.copytree(begin, work)
-        told = cut_off(work, operation, how, step)
-        shutil.rmtree(work)
-        print(json.dumps(told), flush=True)
-        if "fault" in told or (not told["killed"] and told["steps"] <= step):
-            return
-        step += 1
+    every_step(begin, work, lambda step: cut_off(work, operation, how, step))
 
 
 if __name__ == "__main__":

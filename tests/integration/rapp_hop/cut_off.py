@@ -6,14 +6,12 @@ operation was done again. Each try is a process of its own; this one starts no t
 """
 
 import asyncio
-import json
-import shutil
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
-from fakes.cutting import Cut, cutter, in_child, put_in
+from fakes.cutting import Cut, cutter, every_step, one_try, put_in
 from rapp_hop.errors import HopError, Refused
 from rapp_hop.hz.delivery import Delivery
 from rapp_hop.streaming import Progress, Writer
@@ -94,21 +92,12 @@ def cut_off(store: Path, home: Path, operation: str, how: str, step: int) -> dic
         after = look(home)
         return {"after": after, "again": attempt(store, home, operation, lambda _: None), "end": look(home)}
 
-    came = in_child(tried)
-    return {"step": step, "killed": came is None, **(came or {}), **(in_child(recovered) or {"fault": "killed twice"})}
+    return one_try(step, tried, recovered)
 
 
 def main(store: Path, begin: Path, work: Path, operation: str, how: str) -> None:
     """Go on until the operation comes to its end."""
-    step = 0
-    while True:
-        shutil.copytree(begin, work, symlinks=True)
-        told = cut_off(store, work, operation, how, step)
-        shutil.rmtree(work)
-        print(json.dumps(told), flush=True)
-        if "fault" in told or (not told["killed"] and told["steps"] <= step):
-            return
-        step += 1
+    every_step(begin, work, lambda step: cut_off(store, work, operation, how, step))
 
 
 if __name__ == "__main__":

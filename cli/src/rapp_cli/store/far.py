@@ -2,8 +2,11 @@
 
 import argparse
 import tempfile
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
+
+from tuf.api.metadata import Targets  # type: ignore[attr-defined]  # public, but not in __all__
 
 from rapp_cli.errors import UsageError
 from rapp_cli.store.remote import (
@@ -63,31 +66,30 @@ def show_far(options: argparse.Namespace) -> int:
 
 def yank_far(options: argparse.Namespace) -> int:
     """Take a version off offer."""
-    remote, ring = remote_of(options), ring_of(folder_of(options))
-    publisher = publisher_of(ring, options.publisher)
-
-    async def yank(store: RemoteStore) -> None:
-        standing = await store.standing(publisher)
-        await store.replace(signed(standing.without(options.name, options.version), signer_of(ring, standing)))
-
-    with_store(remote, yank)
+    _replace(options, lambda standing: standing.without(options.name, options.version))
     print(f"{options.name} {options.version} is off offer")
     return 0
 
 
 def renew_far(options: argparse.Namespace) -> int:
     """Sign the list that is on offer for longer."""
+    publisher, follows = _replace(options, lambda standing: standing.renewed())
+    print(f"the list of {publisher} is good until {follows.expires:%F}")
+    return 0
+
+
+def _replace(options: argparse.Namespace, change: Callable[[Standing], Targets]) -> tuple[str, Targets]:
+    """Put a signed list in place of the publisher's; gives the publisher and the list."""
     remote, ring = remote_of(options), ring_of(folder_of(options))
     publisher = publisher_of(ring, options.publisher)
 
-    async def renew(store: RemoteStore) -> str:
+    async def replace(store: RemoteStore) -> Targets:
         standing = await store.standing(publisher)
-        follows = standing.renewed()
+        follows = change(standing)
         await store.replace(signed(follows, signer_of(ring, standing)))
-        return f"{follows.expires:%F}"
+        return follows
 
-    print(f"the list of {publisher} is good until {with_store(remote, renew)}")
-    return 0
+    return publisher, with_store(remote, replace)
 
 
 def about(manifest: Manifest, publisher: str) -> list[str]:
