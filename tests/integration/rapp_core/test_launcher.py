@@ -178,7 +178,7 @@ def test_orphans_are_killed_and_their_folders_removed(tmp_path, wait_for):
     assert not folder.exists()
 
 
-def test_l07_a_sandbox_that_was_about_to_start_is_killed(tmp_path):
+def test_l07_a_sandbox_that_was_about_to_start_is_killed(tmp_path, wait_for):
     """Its parent has died in its first moments, before anything was noted; it is known by its folder."""
     folder = tmp_path / "runs" / "old"
     folder.mkdir(parents=True)
@@ -186,6 +186,7 @@ def test_l07_a_sandbox_that_was_about_to_start_is_killed(tmp_path):
     words = ["bwrap", "--dev-bind", "/", "/", "--ro-bind", str(folder), f"{folder}/", "--block-fd", str(read), "sleep", "60"]
     waiting = subprocess.Popen(words, pass_fds=[read])
     try:
+        wait_for(lambda: "bwrap" in Path(f"/proc/{waiting.pid}/cmdline").read_text())  # empty for a moment after exec
         orphans.clear(tmp_path / "runs")
         assert waiting.wait(20) == -signal.SIGKILL
         assert not folder.exists()
