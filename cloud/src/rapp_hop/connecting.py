@@ -1,5 +1,6 @@
 """Tornado's HTTP client for HOP: over TCP or one UNIX socket, its errors translated once into ours."""
 
+import asyncio
 import errno
 import math
 import socket
@@ -10,12 +11,14 @@ from urllib.parse import urlsplit
 
 from tornado.httpclient import HTTPClientError, HTTPRequest, HTTPResponse
 from tornado.iostream import IOStream, UnsatisfiableReadError
+from tornado.netutil import DefaultLoopResolver
 from tornado.simple_httpclient import HTTPStreamClosedError, HTTPTimeoutError, SimpleAsyncHTTPClient
 from tornado.tcpclient import TCPClient
 
 from rapp_hop.errors import Bug, HopError, Invalid, Refused, Unreachable
 
 MAX_TIMEOUT = 24 * 3600.0  # seconds
+NAME_TIMEOUT = 4.0  # seconds to find an address; shorter than the time to connect, after which Tornado would log what comes late
 NOT_SENT = "not sent"
 """`HopError.reason` of a call of which nothing was sent."""
 CUT = "cut"
@@ -40,7 +43,7 @@ _NOBODY = frozenset({errno.ECONNREFUSED, errno.ENOENT, errno.EHOSTUNREACH, errno
 
 def make_connections(socket_path: Path | None, **bounds: int) -> SimpleAsyncHTTPClient:
     """Return a client of its own; every connection goes to one UNIX socket, where a path is given."""
-    client = SimpleAsyncHTTPClient(force_instance=True, **bounds)
+    client = SimpleAsyncHTTPClient(force_instance=True, resolver=_Resolver(), **bounds)
     if socket_path is not None:
         client.tcp_client.close()
         client.tcp_client = _SocketClient(socket_path)
@@ -88,6 +91,17 @@ def _away(message: str, reason: str) -> Unreachable:
     error = Unreachable(message)
     error.reason = reason
     return error
+
+
+class _Resolver(DefaultLoopResolver):
+    """Finds addresses within a bound; the system's own waits for a name server that is away as long as it likes."""
+
+    async def resolve(self, host: str, port: int, family: socket.AddressFamily = socket.AF_UNSPEC) -> list[tuple[int, Any]]:
+        """Return (family, address) pairs. Raises gaierror."""
+        try:
+            return await asyncio.wait_for(super().resolve(host, port, family), NAME_TIMEOUT)
+        except TimeoutError:
+            raise socket.gaierror(socket.EAI_AGAIN, "no name server answers") from None
 
 
 class _SocketClient(TCPClient):

@@ -1,6 +1,9 @@
 """HOP's client: what servers may send it, and to whom it shows its token."""
 
 import asyncio
+import gc
+import socket
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +11,7 @@ import pytest
 
 from fakes.echoing import TOKEN, failure
 from rapp_hop import client as client_module
+from rapp_hop import connecting
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Bug, HopError, Invalid, Refused, Unreachable
 
@@ -147,3 +151,27 @@ def test_an_answer_that_is_not_json_or_too_long(tmp_path: Path, monkeypatch: pyt
             assert isinstance(await failure(HopClient(url).call("x")), Unreachable | Invalid)
 
     asyncio.run(main())
+
+
+def test_a_name_server_that_is_away_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    """The system's resolver goes on for long after we have given up, then fails: nobody is troubled with that."""
+    back, went = threading.Event(), threading.Event()
+
+    def resolve(*_: object, **__: object) -> None:
+        back.wait(20)
+        went.set()
+        raise socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")
+
+    monkeypatch.setattr(socket, "getaddrinfo", resolve)
+    monkeypatch.setattr(connecting, "NAME_TIMEOUT", 0.05)
+
+    async def call() -> None:
+        error = await failure(HopClient("http://platform.test").call("echo", {}, timeout=10))
+        assert isinstance(error, Unreachable)
+        assert "no name server answers, try again later" in str(error)
+        back.set()
+        await asyncio.to_thread(went.wait, 20)
+
+    asyncio.run(call())
+    gc.collect()
+    assert caplog.records == []
