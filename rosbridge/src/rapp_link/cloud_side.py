@@ -3,12 +3,13 @@
 import asyncio
 import json
 import logging
+from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from rapp_hop.client import HopClient
-from rapp_hop.errors import Bug, HopError, Invalid, Refused, Unreachable
+from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
 from rapp_hop.hz.delivery import Recipient
 from rapp_link.config import Config
 from rapp_link.disk import Disk, replace_whole
@@ -18,6 +19,7 @@ from rapp_link.threads import in_thread
 _log = logging.getLogger(__name__)
 PATIENCE = 10.0  # seconds for a heartbeat, a registration or a report
 SHORTEST = 0.5  # seconds between heartbeats
+_OF_THE_REPORT = {400, 413}  # HTTP statuses by which the platform says that the report itself is wrong
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,7 @@ class Platform:
         self._lease = 3 * config.heartbeat_most  # seconds; the platform says it
         self._wake = asyncio.Event()
         self._complaint = ""  # what the log says of the platform already
+        self._odd: Counter[Path] = Counter()  # how often a report was answered oddly
         self.reachable = False
 
     @property
@@ -146,18 +149,33 @@ class Platform:
         return answer
 
     async def _send_reports(self, identity: Identity) -> None:
-        for path in await in_thread(self._reports.waiting):
+        """Send what waits. An odd answer ends the round, and its report goes behind the others: it must not block them."""
+        for path in sorted(await in_thread(self._reports.waiting), key=self._odd.__getitem__):
             try:
-                run = await in_thread(self._reports.read, path)
+                await self._send_report(identity, path)
+            except HopError as error:
+                if isinstance(error, Unreachable) or error.status == 401:
+                    raise  # the next one would fare no better
+                if not self._odd[path]:
+                    _log.warning("report %s waits: %s", path.name, error)
+                self._odd[path] += 1
+                return
+            del self._odd[path]
+
+    async def _send_report(self, identity: Identity, path: Path) -> None:
+        """Send one report; what nobody can read, and what the platform finds wrong, is dropped: it would be so for ever."""
+        try:
+            run = await in_thread(self._reports.read, path)
+        except Invalid as error:
+            _log.error("report %s is dropped: %s", path.name, error)
+        else:
+            try:
                 await self._client.call("report", {"robot": identity.robot, "run": run}, timeout=PATIENCE)
-            except Unreachable:
-                raise
-            except (Refused, Invalid, Bug) as error:
-                if error.status == 401:
-                    raise  # nothing is wrong with the report: this robot is not let in, until it has another token
-                # One that is refused today is refused tomorrow: it must not block the others for ever.
-                _log.error("report %s: %s", path.name, error)
-            await in_thread(self._reports.done, path)
+            except HopError as error:
+                if error.status not in _OF_THE_REPORT:
+                    raise
+                _log.error("report %s is dropped: %s", path.name, error)
+        await in_thread(self._reports.done, path)
 
     def _write_down(self, identity: Identity) -> None:
         try:
