@@ -8,7 +8,8 @@ import contextlib
 import json
 import os
 import signal
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Coroutine, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,29 @@ from rapp_cli.errors import CommandError
 
 READY_TIMEOUT = 40.0  # s, from start to the READY line
 TERM_TIMEOUT = 12.0  # s, from SIGTERM to SIGKILL
+LAST_WORDS = 2.0  # s for the rest of an ended process's output: whoever inherited it may hold it open
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+async def interruptible(work: Coroutine[Any, Any, int], name: str) -> int:
+    """Do a command's work; Ctrl-C, SIGTERM and a closed terminal cancel it, so that every child is ended on the way out.
+
+    Gives the exit status, 130 when it was interrupted. Signals that were ignored (nohup, a shell's background job) stay so.
+    """
+    task = asyncio.create_task(work)
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+    try:
+        return await task
+    except asyncio.CancelledError:
+        with contextlib.suppress(OSError):  # the terminal may be gone
+            print(f"rapp {name}: interrupted; every process is ended", file=sys.stderr)
+        return 130
 
 
 class Child:
-    """One process with its own process group and log file."""
+    """One process with its own process group and log file; it is told to end when this process dies."""
 
     def __init__(self, name: str, words: Sequence[str], env: Mapping[str, str], log: Path) -> None:
         self.name = name
@@ -39,7 +59,7 @@ class Child:
         self._ready = asyncio.get_running_loop().create_future()
         with self.log.open("ab") as log:
             self._process = await asyncio.create_subprocess_exec(
-                *self._words,
+                *("setpriv", "--pdeathsig", "TERM", *self._words),
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=log,
@@ -88,7 +108,7 @@ class Child:
                 os.killpg(self._process.pid, signal.SIGKILL)
             await self._process.wait()
         if self._pump is not None:
-            await self._pump
+            await asyncio.wait({self._pump}, timeout=LAST_WORDS)
 
 
 class Children:
@@ -101,6 +121,18 @@ class Children:
         return self
 
     async def __aexit__(self, *_exception: object) -> None:
+        ending = asyncio.create_task(self._end())
+        cancelled: asyncio.CancelledError | None = None
+        while not ending.done():
+            try:
+                await asyncio.shield(ending)
+            except asyncio.CancelledError as error:  # a further signal: told once all are ended
+                cancelled = error
+        if cancelled is not None:
+            raise cancelled
+        ending.result()
+
+    async def _end(self) -> None:
         while self._started:
             await self._started.pop().stop()
 

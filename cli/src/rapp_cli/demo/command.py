@@ -2,8 +2,6 @@
 
 import argparse
 import asyncio
-import signal
-import sys
 from collections.abc import Callable, Coroutine
 from typing import Any
 
@@ -15,6 +13,7 @@ from rapp_cli.demo.system import System, running_system
 from rapp_cli.demo.voice_mail import VoiceMail
 from rapp_cli.errors import CommandError
 from rapp_cli.person import Person
+from rapp_cli.processes import interruptible
 from rapp_cli.timeline import Entry, Timeline, follow
 
 __all__ = ["add_options", "run"]
@@ -29,18 +28,7 @@ STORIES: dict[str, Callable[[DemoConfig, System], Story]] = {
 def run(options: argparse.Namespace) -> int:
     """Run the demo; 0 only when the story has ended well."""
     config = read(options)
-    return asyncio.run(_interruptible(_demo(config)))
-
-
-async def _interruptible(work: Coroutine[Any, Any, int]) -> int:
-    """SIGTERM ends like Ctrl-C: by cancelling, so that every child is ended on the way out."""
-    task = asyncio.create_task(work)
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
-    try:
-        return await task
-    except asyncio.CancelledError:
-        print("rapp demo: interrupted; every process is ended", file=sys.stderr)
-        return 130
+    return asyncio.run(interruptible(_demo(config), "demo"))
 
 
 async def _demo(config: DemoConfig) -> int:

@@ -11,6 +11,7 @@ from rapp_cli.demo.story import ask
 from rapp_cli.demo.system import System, running_system
 from rapp_cli.errors import CommandError, UsageError
 from rapp_cli.person import Person
+from rapp_cli.processes import interruptible
 from rapp_cli.store.place import told
 from rapp_cli.store.publish import parts
 from rapp_cli.timeline import Entry, Timeline, follow
@@ -40,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     words = argparse.ArgumentParser()
     demo.add_options(words)
     config = replace(demo.read(words.parse_args([]), {}), command=keyword, silent=True, timeout=options.timeout)
-    return asyncio.run(_try(config, folders, options.answer))
+    return asyncio.run(interruptible(_try(config, folders, options.answer), "run"))
 
 
 def _manifest(folder: Path) -> Manifest:
