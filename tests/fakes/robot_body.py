@@ -132,6 +132,10 @@ class FakeMotion:
         self._running = [each for each in self._running if not each.done()] + [movement]
         return movement
 
+    def shift(self, x: float) -> None:
+        """A robot that stands is moved along its odom by so many m."""
+        self._pose = Pose2D(self._pose.x + x, self._pose.y, self._pose.theta)
+
     def moving(self) -> bool:
         return self._walk is not None
 

@@ -137,6 +137,45 @@ def test_an_obstacle_ahead_is_no_hazard_for_who_steps_back_turns_or_steps_aside(
     walk(bench, 0.0, 0.2)
 
 
+def test_however_slow_or_short_a_walk_ahead_is_no_obstacle_is_walked_into(bench: Bench) -> None:
+    bench.fake.feeling.feel(sonar=(math.inf, 0.25))
+    for x, y in ((0.019, 0.0), (0.001, 0.0), (0.01, 0.06)):
+        with pytest.raises(Refused, match="obstacle"):
+            drive(bench, x, y)
+    for begin in (lambda: walk(bench, 0.02), lambda: walk(bench, 0.001), lambda: along(bench, ("base_link", 0.01, 0.0, 0.0))):
+        with pytest.raises(Refused, match="obstacle"):
+            begin()
+    assert bench.fake.journal == []
+
+
+def test_poses_close_to_each_other_do_not_lead_into_an_obstacle(bench: Bench) -> None:
+    bench.clock.at(0.3, lambda: bench.fake.feeling.feel(sonar=(0.25, math.inf)))
+    with pytest.raises(Refused, match="obstacle"):
+        along(bench, *[("odom", 0.02 * number, 0.0, 0.0) for number in range(1, 10)])
+    assert bench.fake.motion.pose().x < 0.05
+
+
+def test_a_slow_walk_is_stopped_by_an_obstacle(bench: Bench) -> None:
+    drive(bench, 0.019)
+    bench.clock.at(3.0, lambda: bench.fake.feeling.feel(sonar=(0.25, math.inf)))
+    bench.go_on()
+    assert 3.0 <= bench.clock.time <= 3.1
+
+
+def test_who_sways_while_it_turns_or_steps_aside_does_not_walk_ahead(bench: Bench) -> None:
+    bench.fake.feeling.feel(sonar=(0.2, 0.2))
+    bench.fake.motion.at = "Crouch"
+    bench.clock.at(1.0, lambda: bench.fake.motion.shift(-0.015))  # while it stands up
+    walk(bench, 0.0, 0.0, 1.0)
+    walk(bench, 0.0, 0.2)
+
+
+def test_who_has_met_something_and_steps_aside_slowly_back_does_not_step_back(bench: Bench) -> None:
+    bench.fake.feeling.feel(bumpers=(True, False))
+    with pytest.raises(Refused, match="bumper"):
+        drive(bench, -0.001, 0.06)
+
+
 def test_who_has_met_something_may_step_back_only(bench: Bench) -> None:
     bench.fake.feeling.feel(bumpers=(True, True))
     walk(bench, -0.2)

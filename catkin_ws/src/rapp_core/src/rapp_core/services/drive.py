@@ -6,6 +6,7 @@ from rapp_core.errors import Invalid, Refused
 from rapp_core.geometry import finite
 from rapp_core.services.context import Context, request
 from rapp_core.services.moving import FEELING, Every, motion, refuse_hazard, refuse_what_ended, standing_up
+from rapp_core.services.reflexes import lasting
 
 POSTURE = "StandInit"
 
@@ -25,7 +26,7 @@ def machine(context: Context) -> Machine:
         ):
             if abs(value) > most * (1 + 1e-6):  # the request's numbers are of single precision
                 raise Refused(f"cannot walk with {name} {value:g} {unit}: -{most:g} to {most:g} are allowed")
-        refuse_hazard(context, velocity)
+        refuse_hazard(context, lasting(velocity))
 
     return Machine("rapp_move_vel", {"check": Behaviour("check", check, label="check")}, "check", [], ["check"])
 
@@ -46,7 +47,10 @@ def drive_machine(context: Context) -> Machine:
             go(share)
         share.memory["late"] = context.now() + context.config.motion_time  # the lease bounds it, not its length
         if feeling.due():
-            refuse_hazard(context, wanted)
+            refuse_hazard(context, lasting(wanted))
+
+    def explain(share: Subsystem) -> None:
+        refuse_what_ended(context, lasting(_velocity(share)))
 
     def prepared(_share: Subsystem) -> bool:
         return robot.motion.standing() and (robot.motion.moving() or robot.motion.posture() == POSTURE)
@@ -56,9 +60,7 @@ def drive_machine(context: Context) -> Machine:
         {
             "look": Behaviour("look", lambda _share: None, label="posture"),
             "stand": standing_up(context),
-            "drive": motion(
-                context, "drive", go, "move", watch=watch, explain=lambda share: refuse_what_ended(context, _velocity(share))
-            ),
+            "drive": motion(context, "drive", go, "move", watch=watch, explain=explain),
         },
         "look",
         [Edge("look", "drive", prepared, "StandInit"), Edge("look", "stand"), Edge("stand", "drive")],

@@ -74,8 +74,13 @@ class _Walk:
     def walk(self, _share: Subsystem) -> Movement:
         """Walk to the goal."""
         self._pose = self._motion.pose()
-        self._way = self.left()
-        return self._walk(self._way)
+        left = self.left()
+        self._way = left if _tells(left) else self._planned()
+        return self._walk(left)
+
+    def _planned(self) -> Pose2D:
+        """The way to the present goal from where the robot was to be before."""
+        return relative(self._goals[self._reached - 1] if self._reached else self._start, self._goal)
 
     def _walk(self, way: Pose2D) -> Movement:
         self._context.trace.call("core", "ALMotion", "moveTo")
@@ -86,7 +91,7 @@ class _Walk:
         if self._feeling.due():
             self._pose = self._motion.pose()
             left = self.left()
-            if self._way != ON_THE_SPOT and math.hypot(left.x, left.y) > NEARLY:
+            if self._way != ON_THE_SPOT and _tells(left):
                 self._way = left
             refuse_hazard(self._context, self._way)
 
@@ -118,6 +123,11 @@ class _Walk:
     def on_path(self, _share: Subsystem) -> Mapping[str, Any]:
         """Feedback of rapp_move_along_path."""
         return {"reached": self._reached, "pose": self._context.place.in_map(self._pose)}
+
+
+def _tells(left: Pose2D) -> bool:
+    """Whether what is left of a way tells in which direction the robot walks."""
+    return math.hypot(left.x, left.y) > NEARLY
 
 
 def machine(context: Context) -> Machine:
