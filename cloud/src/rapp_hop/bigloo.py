@@ -57,6 +57,7 @@ class _Reader:
         self._place = 0
         self._depth = 0
         self._items = 0
+        self._octets = 0
         self._known: dict[int, Any] = {}
         self._marks: dict[int, Callable[[], Any]] = {
             ord("="): self._definition, ord("#"): lambda: self._known[self._index()],
@@ -135,6 +136,9 @@ class _Reader:
         return unquote_to_bytes(self._string())
 
     def _text(self, value: Any) -> str:
+        if not isinstance(value, bytes | str):
+            raise Invalid("cannot read Bigloo's serialisation: a name that is no text")
+        self._unfold(1, len(value))
         return value.decode("utf-8") if isinstance(value, bytes) else str(value)
 
     def _float(self) -> float:
@@ -176,6 +180,7 @@ class _Reader:
         payload = self._item()
         self._item()  # the hash of its class, once more
         fields = payload[1:] if isinstance(payload, list) else []  # the first is the hash
+        self._unfold(len(fields))
         if fields and isinstance(fields[0], Keyword):
             if len(fields) % 2:
                 raise Invalid("cannot read Bigloo's serialisation: a property without value")
@@ -183,10 +188,9 @@ class _Reader:
         return fields[0] if fields else {}
 
     def _plain(self, value: Any, depth: int) -> Any:
-        # References let few bytes stand for endless many items: what is unfolded counts too.
-        self._items += 1
-        if depth > MAX_DEPTH or self._items > MAX_ITEMS:
-            raise Invalid("cannot read Bigloo's serialisation: too deep or too many items")
+        if depth > MAX_DEPTH:
+            raise Invalid("cannot read Bigloo's serialisation: too deep")
+        self._unfold(1, len(value) if isinstance(value, bytes | str) else 0)
         if isinstance(value, _Octets):
             return bytes(value)
         if isinstance(value, bytes):
@@ -196,6 +200,13 @@ class _Reader:
         if isinstance(value, dict):
             return {key: self._plain(item, depth + 1) for key, item in value.items()}
         return str(value) if isinstance(value, Keyword) else value
+
+    def _unfold(self, items: int, octets: int = 0) -> None:
+        """Count what references may repeat: with them few bytes stand for endless many items, or long texts."""
+        self._items += items
+        self._octets += octets
+        if self._items > MAX_ITEMS or self._octets > MAX_BYTES:
+            raise Invalid("cannot read Bigloo's serialisation: too many items, or too long when unfolded")
 
 
 class _Octets(bytes):

@@ -77,14 +77,33 @@ def test_h12_broken_or_hostile(data: bytes) -> None:
         bigloo.loads(data)
 
 
-def test_h12_few_bytes_do_not_unfold_to_many() -> None:
-    layers = b"=\x00[\x01\x02TT"
-    for number in range(1, 30):
-        layers = (
-            b"=\x01" + bytes([number]) + b"[\x01\x02" + layers + b"#" + (b"\x00" if number == 1 else b"\x01" + bytes([number - 1]))
-        )
-    with pytest.raises(Invalid, match="too many"):
-        bigloo.loads(layers)
+def _doubled(layers: int) -> bytes:
+    """A vector in which each item holds the one before twice, by reference."""
+    items = [b"=\x01\x01[\x01\x02TT"]
+    items += [b"=\x01%c[\x01\x02#\x01%c#\x01%c" % (number, number - 1, number - 1) for number in range(2, layers + 1)]
+    return b"[\x01%c" % (layers + 1) + b"".join(items)
+
+
+_LAST = b"#\x01\x1e"
+_TEXT = b'=\x01\x01"\x02\x40\x00' + b"x" * 2**14
+_MANY = 2**11
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        _doubled(30) + _LAST,  # a value
+        _doubled(30) + b":" + _LAST,  # a keyword
+        _doubled(30) + b'XO(\x01\x05\x00:"\x01\x01a\x01\x01' + _LAST + b"T\x00",  # a name that follows a name
+        b"[\x02\x08\x01" + _TEXT + b"#\x01\x01" * _MANY,  # one long text, often
+        b"[\x02\x08\x01" + _TEXT + b":#\x01\x01" * _MANY,  # one long keyword, often
+        b'[\x02\x08\x01=\x01\x01[\x02\x08\x00:"\x01\x01k' + b"T" * (_MANY - 1) + b"O#\x01\x01T" * _MANY,  # fields of instances
+        b'[\x02\x08\x01=\x01\x01h\x02\x40\x00\x01\x01"\x01\x02u8' + b"x" * 2**14 + b"#\x01\x01" * _MANY,  # octets, often
+    ],
+)
+def test_h12_few_bytes_do_not_unfold_to_many(data: bytes) -> None:
+    with pytest.raises(Invalid, match=r"too many|no text"):
+        bigloo.loads(data)
 
 
 def test_h12_a_value_that_holds_itself_ends() -> None:
