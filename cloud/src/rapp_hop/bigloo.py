@@ -117,7 +117,7 @@ class _Reader:
 
     def _index(self) -> int:
         index = self._item()
-        if index not in self._known:
+        if type(index) is not int or index not in self._known:
             raise Invalid("cannot read Bigloo's serialisation: a reference to nothing")
         return int(index)
 

@@ -63,6 +63,7 @@ def test_what_is_written_reads_back(value: Any) -> None:
         b'"\x01\x01\xff',
         b"TT",
         b"#\x01\x01",
+        b"#[\x00",
         b"=T\x01\x01",
         b"[\x04\xff\xff\xff\xff",
         b"[\x01\x01" * 300 + b"T",
