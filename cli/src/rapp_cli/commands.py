@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rapp_cli import administer, bench, runs, sim, test
 from rapp_cli.demo import command as demo
-from rapp_cli.home import down, join, listen, log, retry, say, status, up
+from rapp_cli.home import down, join, listen, log, remove, retry, say, status, up
 from rapp_cli.hz import command as hz
 from rapp_cli.store import command as store
 from rapp_cli.store import keys, new, publish, trial
@@ -31,6 +31,7 @@ COMMANDS = (
     Command("listen", "speak to it by this computer's microphone", listen.add_options, listen.run),
     Command("status", "show every agent, its state and since when", status.add_options, status.run),
     Command("retry", "let a RApp that keeps failing be started again at once", retry.add_options, retry.run),
+    Command("remove", "take an installed RApp off the robot", remove.add_options, remove.run),
     Command("log", "show what the agents write, and follow it", log.add_options, log.run),
     Command("trace", "draw the last run as a UML sequence diagram", trace.add_options, trace.run),
     Command("runs", "show what robots have run, how long, what failed", runs.add_options, runs.run),

@@ -128,7 +128,7 @@ class Commands:
         return {"back": before.version}
 
     async def remove(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
-        """{name} → {removed}."""
+        """{name} → {removed}; refused while it runs."""
         (name,) = take(arguments, name=str)
         return {"removed": await self._store().remove(name)}
 

@@ -105,6 +105,21 @@ def test_it_comes_again_when_it_is_asked_for_by_version_or_after_a_removal(robot
     asyncio.run(test())
 
 
+def test_what_runs_is_not_removed_and_a_removal_leaves_nothing_of_a_download(robot: Robot) -> None:
+    robot.publish("hello")
+    robot.install("hello")
+    part, package = robot.home / "downloads" / "hello~1.1.0~ab.part", robot.home / "runs" / "r1" / "package"
+    package.mkdir(parents=True)
+    (package / "package.json").write_text('{"name": "hello"}')
+    part.write_bytes(b"x")
+    with pytest.raises(Refused, match="it runs"):
+        asyncio.run(robot.delivery().remove("hello"))
+    assert robot.rapps == {"hello"} and part.exists()
+    (package / "package.json").unlink()
+    assert asyncio.run(robot.delivery().remove("hello"))
+    assert robot.rapps == set() and not part.exists()
+
+
 def test_news_of_another_version_change_nothing(robot: Robot) -> None:
     async def test() -> None:
         delivery = await updated(robot)

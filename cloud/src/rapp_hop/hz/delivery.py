@@ -19,7 +19,7 @@ from rapp_hop.hz.archive import inspect
 from rapp_hop.hz.downloads import Downloads
 from rapp_hop.hz.install import Installed, PackageFile, RappFolder, install
 from rapp_hop.hz.manifest import Manifest, reasons_against
-from rapp_hop.hz.quota import Claim, Quota, unpacked_size
+from rapp_hop.hz.quota import Claim, Quota, running, unpacked_size
 from rapp_hop.hz.semver import parse_version
 from rapp_hop.hz.tar import Limits
 from rapp_hop.hz.trust import Attack, Release, TrustedStore, Untrusted, Versions, choose
@@ -104,9 +104,12 @@ class Delivery:
                 raise
 
     async def remove(self, name: str) -> bool:
-        """Remove a RApp; false when it was not there."""
+        """Remove a RApp and what has come of its next version; false when it was not there.
+
+        :raises Refused: while it runs, or when the disk is unwilling
+        """
         async with self._alone(name):
-            return await asyncio.to_thread(self.folder.remove, name)
+            return await asyncio.to_thread(self._remove, name)
 
     async def started(self, name: str, version: str, ok: bool) -> Installed | None:
         """Take note how the first start of a version ended: one that started replaces the version before for good.
@@ -137,6 +140,16 @@ class Delivery:
             return None
         there = self.folder.find(name)
         return self.folder.go_back(name) if there is not None and there.version == version else None
+
+    def _remove(self, name: str) -> bool:
+        if name in running(self._home / "runs"):
+            raise Refused(f"cannot remove {name}: it runs, stop it or wait for its end")
+        removed = self.folder.remove(name)
+        try:
+            self._downloads.remove(name)
+        except OSError as error:
+            raise Refused(f"cannot remove what has come of {name}: {error.strerror}, check the disk") from None
+        return removed
 
     def _tidy(self) -> None:
         self.folder.tidy()

@@ -28,10 +28,14 @@ class Downloads:
         """Return the file for a package, of which a part may be there; those of its other versions go."""
         self._folder.mkdir(parents=True, exist_ok=True)
         mine = self._folder / f"{name}~{version}~{digest[:32]}.part"
-        for path in self._folder.glob(f"{name}~*"):
-            if path != mine:
-                path.unlink(missing_ok=True)
+        self.remove(name, mine)
         return mine
+
+    def remove(self, name: str, but: Path | None = None) -> None:
+        """Remove what has come of a RApp's packages, but not one of the files."""
+        for path in self._folder.glob(f"{name}~*"):
+            if path != but:
+                path.unlink(missing_ok=True)
 
     def parts(self) -> dict[Path, str]:
         """Return what is there, the oldest first, and the RApp that it belongs to."""

@@ -64,7 +64,7 @@ class Quota:
         parts = {path: _size(path) for path, owner in self._downloads.parts().items() if owner not in self._claims}
         over = sum(rapps.values()) + sum(parts.values()) + sum(self._claims.values()) + size - self.limit
         last_used = {known: self._folder.last_used(known) for known in rapps}
-        kept = {*self._claims, *_running(self._home / "runs")}
+        kept = {*self._claims, *running(self._home / "runs")}
         kept |= {known for known, when in last_used.items() if abs(time.time() - when) < FRESH}
         leaving = sorted(rapps.keys() - kept, key=lambda known: last_used[known])
         if over > sum(parts.values()) + sum(rapps[known] for known in leaving):
@@ -106,7 +106,8 @@ def _blocks(size: int) -> int:
     return -(-size // BLOCK) * BLOCK
 
 
-def _running(runs: Path) -> set[str]:
+def running(runs: Path) -> set[str]:
+    """Return the names of the RApps that run: each run has a copy of its package."""
     found = set()
     for path in runs.glob("*/package/package.json"):
         try:

@@ -1,0 +1,34 @@
+"""`./rapp remove` when there is nothing to remove, or nobody to do it."""
+
+import argparse
+
+import pytest
+
+from fakes.rapps import install_rapp
+from rapp_cli.errors import CommandError
+from rapp_cli.home import remove
+from rapp_cli.home.place import Home, Settings
+
+
+@pytest.fixture
+def home(tmp_path_factory: pytest.TempPathFactory) -> Home:
+    home = Home(tmp_path_factory.mktemp("x"))
+    home.make()
+    return home
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("parrot", "not installed; ./rapp status"), ("../clock", "RApp of this name"), ("", "RApp of this name")]
+)
+def test_what_is_not_there_is_told(home: Home, name: str, told: str) -> None:
+    install_rapp(home.robot, "clock")
+    with pytest.raises(CommandError, match=told):
+        remove.run(argparse.Namespace(rapp=name, home=home.folder))
+    assert (home.robot / "rapps" / "clock").exists()
+
+
+def test_a_robot_that_is_not_up_is_to_be_started(home: Home) -> None:
+    install_rapp(home.robot, "clock")
+    home.keep(Settings("nao", None, None, None, (), {"rosbridge": 1}))
+    with pytest.raises(CommandError, match=r"the robot is away .*start it with ./rapp up"):
+        remove.run(argparse.Namespace(rapp="clock", home=home.folder))
