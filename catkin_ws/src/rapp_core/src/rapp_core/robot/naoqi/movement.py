@@ -1,9 +1,13 @@
 """One motion under way on NAOqi: the future of a call that ends when the motion does."""
 
+import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
 from rapp_core.robot.naoqi.connection import Connection
+
+EVERY = 0.05  # s between two looks whether a robot that was told a velocity still walks
 
 
 class NaoqiMovement:
@@ -55,15 +59,24 @@ class Walking:
         self._begun = begun
         self._halt = halt
         self._result = result
+        self._halted = threading.Event()
 
     def done(self) -> bool:
         """See `body_ports.Movement`."""
         return bool(self._begun.isFinished()) and not self._active()
 
     def wait(self, seconds: float) -> bool:
-        """See `body_ports.Movement`; waits for its beginning only."""
+        """See `body_ports.Movement`; a look at the robot costs a call, so it looks now and then, and when it is told to stop."""
+        until = time.monotonic() + seconds
         self._begun.wait(round(seconds * 1000))
-        return self.done()
+        while True:
+            left = until - time.monotonic()
+            if left > 0 and self._halted.wait(min(left, EVERY)):
+                self._halted.clear()
+            if self.done():
+                return True
+            if left <= EVERY:
+                return False
 
     def result(self) -> bool:
         """See `body_ports.Movement`: it has no goal, so it ends by being stopped."""
@@ -72,4 +85,5 @@ class Walking:
 
     def cancel(self) -> None:
         """See `body_ports.Movement`."""
+        self._halted.set()
         self._halt()
