@@ -9,11 +9,13 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
 from fakes.drawings import assert_kept
+from fakes.processes import descendants, ended, environment, words
 from rapp_cli.paths import ROOT
 from rapp_cli.trace.command import read
 from rapp_cli.trace.figures import FIGURES, figure
@@ -22,6 +24,7 @@ from rapp_cli.trace.messages import last_run
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(400)]
 TIMEOUT = 240  # s of one demo
+MARK = "RAPP_TEST_RUN"  # in the environment of all processes of a run
 SAID_FIRST = "starting word recognition"
 SUNDAY = "I will come home on Sunday afternoon"
 
@@ -54,23 +57,26 @@ class Demo:
         return "\n".join([self.output, *tails])
 
 
+def demo_words(folder: Path, *options: str) -> list[str]:
+    return [str(ROOT / "rapp"), "demo", "--folder", str(folder), *options]
+
+
+def marked(folder: Path) -> dict[str, str]:
+    """An environment by which `processes_of` knows the processes that a demo in this folder has started."""
+    return {**os.environ, MARK: str(folder)}
+
+
 def run_demo(folder: Path, *options: str) -> Demo:
-    words = [str(ROOT / "rapp"), "demo", "--folder", str(folder), *options]
-    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=TIMEOUT, check=False)
+    output: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    done = subprocess.run(demo_words(folder, *options), env=marked(folder), timeout=TIMEOUT, check=False, **output)
     return Demo(done.returncode, done.stdout, folder)
 
 
 def processes_of(folder: Path) -> list[str]:
-    """Command lines of the running processes that name the folder."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            words = path.read_bytes().replace(b"\0", b" ").decode(errors="replace")
-        except OSError:
-            continue  # it ended meanwhile
-        if str(folder) in words and int(path.parent.name) != os.getpid():
-            found.append(words)
-    return found
+    """Command lines of the running processes that were started in a demo's environment."""
+    mark = f"{MARK}={folder}".encode()
+    pids = [int(path.name) for path in Path("/proc").glob("[0-9]*")]
+    return [" ".join(words(pid)) for pid in pids if mark in environment(pid).split(b"\0")]
 
 
 @pytest.fixture(scope="module")
@@ -183,26 +189,64 @@ def test_a_run_is_drawn_with_all_who_took_part(demos: dict[str, Demo]) -> None:
     assert f"person-)a_core: “{SUNDAY}”" in mermaid
 
 
-def _heed_interrupts() -> None:
-    """A shell starts its background jobs with SIGINT ignored, and that is inherited."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def _heed_signals() -> None:
+    """A shell starts its background jobs with SIGINT ignored, nohup with SIGHUP, and that is inherited."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
-def test_an_interrupted_demo_leaves_no_process(tmp_path: Path) -> None:
-    words = [str(ROOT / "rapp"), "demo", "--folder", str(tmp_path)]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, preexec_fn=_heed_interrupts)
+@dataclass(frozen=True)
+class Interrupted:
+    """A demo that was told to end while it ran."""
+
+    status: int
+    output: str
+    running: list[str]  # command lines of its processes before
+    left: list[str]  # and those that are still there
+
+
+def interrupt(folder: Path, line: str, *numbers: signal.Signals) -> Interrupted:
+    """Start a demo, and send it these signals once its output holds a text."""
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    process = subprocess.Popen(demo_words(folder), env=marked(folder), preexec_fn=_heed_signals, **pipes)
     assert process.stdout is not None
     try:
-        for line in process.stdout:
-            if " s9 " in line:  # a dynamic agent is running
+        seen = ""
+        for told in process.stdout:
+            seen += told
+            if line in told:
                 break
-        process.send_signal(signal.SIGINT)
+        pids, running = descendants(process.pid), processes_of(folder)
+        for number in numbers:
+            process.send_signal(number)
+            time.sleep(0.4)
         output, _ = process.communicate(timeout=60)
-        assert process.returncode == 130, output
     finally:
         process.kill()
         process.wait()
-    deadline = time.monotonic() + 10
-    while processes_of(tmp_path) and time.monotonic() < deadline:
+    deadline = time.monotonic() + 20
+    while (left := processes_of(folder) + [" ".join(words(pid)) for pid in pids if not ended(pid)]) and time.monotonic() < deadline:
         time.sleep(0.1)
-    assert processes_of(tmp_path) == []
+    return Interrupted(process.returncode, seen + output, running, left)
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Interrupted]:
+    """One demo is interrupted while a dynamic agent runs, the others as soon as the robot's processes do."""
+    wishes: dict[str, tuple[Any, ...]] = {
+        "interrupt": (" s9 ", signal.SIGINT),
+        "interrupt twice": (" core ", signal.SIGINT, signal.SIGINT),
+        "terminate": (" core ", signal.SIGTERM),
+        "hang up": (" core ", signal.SIGHUP),
+    }
+    with ThreadPoolExecutor(2) as pool:
+        runs = {name: pool.submit(interrupt, tmp_path_factory.mktemp("x"), *wish) for name, wish in wishes.items()}
+        return {name: run.result() for name, run in runs.items()}
+
+
+@pytest.mark.parametrize("name", ["interrupt", "interrupt twice", "terminate", "hang up"])
+def test_an_interrupted_demo_leaves_no_process(interrupted: dict[str, Interrupted], name: str) -> None:
+    run = interrupted[name]
+    for module in ("rosmaster", "rapp_cloud.mail", "rapp_hop.worker", "rapp_nao_sim", "rapp_bridge", "rapp_link", "rapp_core"):
+        assert any(module in command for command in run.running), run
+    assert (run.status, run.left) == (130, []), run.output
