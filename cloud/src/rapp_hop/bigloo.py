@@ -5,6 +5,7 @@ one that begins with a keyword an object, one with a vector an array, and so on.
 kinds that decode everywhere: text, numbers, truth, null, and vectors of them.
 """
 
+import math
 import struct
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -66,7 +67,7 @@ class _Reader:
             ord("T"): lambda: True, ord("F"): lambda: False, ord(";"): lambda: UNDEFINED, ord("."): lambda: None,
             ord("-"): lambda: -self._size(), ord("f"): self._float,
             ord("z"): self._long, ord("E"): self._long, ord("L"): self._long,
-            ord("a"): lambda: chr(self._size()), ord("u"): lambda: chr(self._size()), ord("U"): self._string,
+            ord("a"): self._character, ord("u"): self._character, ord("U"): self._string,
             ord("["): self._vector, ord("("): self._list, ord("^"): self._pairs, ord("h"): self._typed,
             ord("d"): lambda: self._date(1), ord("D"): lambda: self._date(10**9),
             ord("X"): self._item, ord("O"): self._instance,
@@ -141,11 +142,23 @@ class _Reader:
         self._unfold(1, len(value))
         return value.decode("utf-8") if isinstance(value, bytes) else str(value)
 
+    def _digits(self) -> bytes:
+        text = self._string()
+        if b"_" in text:  # Python's own, no number elsewhere
+            raise Invalid("cannot read Bigloo's serialisation: a number that is none")
+        return text
+
     def _float(self) -> float:
-        return float(self._string())
+        return float(self._digits())
 
     def _long(self) -> int:
-        return int(self._string()[:400])
+        return int(self._digits()[:400])
+
+    def _character(self) -> str:
+        found = chr(self._size())
+        if "\ud800" <= found <= "\udfff":
+            raise Invalid("cannot read Bigloo's serialisation: half a character (lone surrogate)")
+        return found
 
     def _vector(self) -> list[Any]:
         return [self._item() for _ in range(self._count())]
@@ -173,7 +186,7 @@ class _Reader:
         return _Octets(data) if code == "B" else list(struct.unpack(f">{count}{code}", data))
 
     def _date(self, per_second: int) -> str:
-        moment = datetime.fromtimestamp(int(self._string()) / per_second, UTC)
+        moment = datetime.fromtimestamp(int(self._digits()) / per_second, UTC)
         return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
     def _instance(self) -> Any:
@@ -199,6 +212,8 @@ class _Reader:
             return [self._plain(item, depth + 1) for item in value]
         if isinstance(value, dict):
             return {key: self._plain(item, depth + 1) for key, item in value.items()}
+        if isinstance(value, float) and not math.isfinite(value):
+            raise Invalid("cannot read Bigloo's serialisation: a number that is not finite")
         return str(value) if isinstance(value, Keyword) else value
 
     def _unfold(self, items: int, octets: int = 0) -> None:

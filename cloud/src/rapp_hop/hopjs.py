@@ -47,6 +47,8 @@ def _number(text: str, place: int) -> tuple[int, int]:
 
 def _value(mark: str, text: str) -> Any:
     try:
+        if mark in "IND" and "_" in text:  # Python's own, no number elsewhere
+            raise ValueError("no number")
         match mark:
             case "I":
                 return int(text)

@@ -5,6 +5,7 @@ Annotations: `str`, `int`, `float`, `bool`, `dict`, `list` (also `list[str]`, `d
 """
 
 import inspect
+import math
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -58,10 +59,12 @@ def parameters_of(function: Callable[..., Any], request_type: type) -> tuple[tup
 
 
 def check_value(value: Any, hint: Any, where: str, name: str) -> Any:
-    """Return `value` when it is of the annotated type (a whole number may stand for a `float`).
+    """Return `value` when it is of the annotated type (a whole number may stand for a `float`) and finite.
 
     :raises Invalid: naming service and parameter
     """
+    if type(value) is float and not math.isfinite(value):
+        raise Invalid(f"cannot call {where}: parameter {name} must be a finite number")
     if hint is Any or (type(value) is hint and hint is not list and hint is not dict):
         return value
     origin, inner = get_origin(hint), get_args(hint)
@@ -94,7 +97,7 @@ def value_from_text(text: str, hint: Any) -> Any:
     if bool in kinds and text.lower() in _TRUTH:
         return _TRUTH[text.lower()]
     for kind in (int, float):
-        if kind in kinds and len(text) <= 40:
+        if kind in kinds and len(text) <= 40 and "_" not in text:  # Python's own way to write numbers
             try:
                 return kind(text)
             except ValueError:

@@ -64,6 +64,15 @@ def test_what_is_written_reads_back(value: Any) -> None:
         b"TT",
         b"#\x01\x01",
         b"#[\x00",
+        b"f\x01\x03nan",
+        b"f\x01\x051e400",
+        b"f\x01\x041_.5",
+        b"f\x01\x031_0",
+        b"z\x01\x031_0",
+        b"D\x01\x031_0",
+        b"u\x02\xd8\x00",
+        b"[\x01\x01u\x02\xdf\xff",
+        b'h\x01\x01\x01\x08"\x01\x03f64\x7f\xf8' + bytes(6),
         b"=T\x01\x01",
         b"[\x04\xff\xff\xff\xff",
         b"[\x01\x01" * 300 + b"T",
@@ -130,7 +139,25 @@ def test_hopjs() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "1", "1.", "1.X1.x", "1.S9.x", "1.I1.x", "1.N3.nan", "2.T", "1.TT", "999.T", "1.s3.%FF", "1.Dundefined.", "-1."]
+    "text",
+    [
+        "",
+        "1",
+        "1.",
+        "1.X1.x",
+        "1.S9.x",
+        "1.I1.x",
+        "1.N3.nan",
+        "1.N3.1_0",
+        "1.I3.1_0",
+        "1.D3.1_0",
+        "2.T",
+        "1.TT",
+        "999.T",
+        "1.s3.%FF",
+        "1.Dundefined.",
+        "-1.",
+    ],
 )
 def test_h12_hopjs_broken(text: str) -> None:
     with pytest.raises(Invalid):

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from rapp_hop.errors import Invalid, Refused
+from rapp_hop.parameters import texts_to_values
 from rapp_hop.registry import ServiceRegistry
 from rapp_hop.service import Request, Service, service
 
@@ -45,6 +46,8 @@ def test_defaults_and_types() -> None:
         ({"text": "a", "count": True}, "count must be a whole number"),
         ({"text": "a", "count": 1.5}, "count must be a whole number"),
         ({"text": "a", "ratio": "x"}, "ratio must be a number"),
+        ({"text": "a", "ratio": float("nan")}, "ratio must be a finite number"),
+        ({"text": "a", "ratio": float("-inf")}, "ratio must be a finite number"),
         ({"text": "a", "on": 1}, "on must be true or false"),
         ({"text": "a", "names": ["x", 3]}, "names must be a list, each a text or null"),
         ({"text": "a", "more": 1}, "no parameter 'more'"),
@@ -54,6 +57,12 @@ def test_defaults_and_types() -> None:
 def test_wrong_arguments_are_named(arguments: dict[str, Any], match: str) -> None:
     with pytest.raises(Invalid, match=match):
         bind(mix, arguments)
+
+
+@pytest.mark.parametrize("texts", [{"ratio": "nan"}, {"ratio": "1e400"}, {"ratio": "-inf"}, {"ratio": "1_0.5"}, {"count": "1_0"}])
+def test_h12_texts_that_are_no_numbers_but_for_python(texts: dict[str, str]) -> None:
+    with pytest.raises(Invalid):
+        bind(mix, texts_to_values({"text": "a", **texts}, mix.known))
 
 
 def test_files_and_request_come_from_the_server_only() -> None:
