@@ -12,6 +12,7 @@ from pathlib import Path
 
 from rapp_cloud.backup import back_up, restore
 from rapp_cloud.config import load_config
+from rapp_cloud.keys import passphrase_from
 from rapp_cloud.memory import Memory, open_memory
 from rapp_cloud.people_commands import add_actions
 from rapp_hop.errors import Refused
@@ -40,9 +41,20 @@ def _restore(words: list[str]) -> int:
     parser = _parser("restore", "Make a platform of a back-up, in an empty folder and an empty database.")
     parser.add_argument("file", type=Path, metavar="FILE")
     options = parser.parse_args(words)
-    at = restore(options.data, _database(options.data), options.file)
-    print(f"{options.data} is the platform of {datetime.fromtimestamp(at, UTC):%F %T} UTC")
-    return 0
+    done = restore(options.data, _database(options.data), options.file, passphrase_from(os.environ))
+    print(f"{options.data} is the platform of {datetime.fromtimestamp(done.at, UTC):%F %T} UTC")
+    print("what was published after that is not on offer: publish it again as it was, or with a higher version")
+    for package in done.expired:
+        print(refused_until_renewed(package))
+    if done.left:
+        again = "when that is mended, run ./rapp keys resume"
+        print(f"robots that saw the newer store refuse this one yet: {done.left}; {again}", file=sys.stderr)
+    return 1 if done.left else 0
+
+
+def refused_until_renewed(package: str) -> str:
+    """Return what to say of a package that `Custody.resume` could not vouch for."""
+    return f"robots refuse {package}: its list has expired, its publisher must run ./rapp store renew --cloud URL"
 
 
 def _invite(words: list[str]) -> int:

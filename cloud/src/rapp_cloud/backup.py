@@ -15,14 +15,18 @@ import tarfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
 import sqlalchemy as sa
 
+from rapp_cloud.custody import Custody
 from rapp_cloud.database.engine import FILE, Database
+from rapp_cloud.keys import KeyRing, Passphrase
+from rapp_cloud.ledger import Ledger
 from rapp_cloud.memory import url_of
-from rapp_hop.errors import Invalid, Refused
+from rapp_hop.errors import HopError, Invalid, Refused
 from rapp_hop.hz.lock import held
 
 FORMAT = 1
@@ -32,6 +36,15 @@ are files still.)"""
 _LIST = "rapp-backup.json"
 _ASIDE = ".restoring"
 _ROWS = 1000  # inserted at once
+
+
+@dataclass(frozen=True)
+class Restored:
+    """What a restore has made."""
+
+    at: float  # when the back-up was made; UTC, seconds since 1970
+    left: str  # why robots that saw a newer store do not believe this one yet; empty: they do
+    expired: list[str]  # see `Custody.resume`
 
 
 def back_up(data: Path, url: str | None, file: Path) -> int:
@@ -57,9 +70,10 @@ def back_up(data: Path, url: str | None, file: Path) -> int:
     return file.stat().st_size
 
 
-def restore(data: Path, url: str | None, file: Path) -> float:
-    """Make a platform of a back-up, where none is; return when the back-up was made (UTC, seconds since 1970).
+def restore(data: Path, url: str | None, file: Path, passphrase: Passphrase | None = None) -> Restored:
+    """Make a platform of a back-up, where none is, and have robots believe it again (`Custody.resume`).
 
+    :param passphrase: of the store's keys
     :raises Refused: when there is a platform already, or the file cannot be read
     :raises Invalid: when the back-up is damaged; nothing has been made then
     """
@@ -85,7 +99,11 @@ def restore(data: Path, url: str | None, file: Path) -> float:
     finally:
         shutil.rmtree(aside, ignore_errors=True)
         database.close()
-    return float(listed["at"])
+    try:
+        expired, left = Custody(Ledger(data / "tuf" / "metadata", KeyRing(data / "keys", passphrase))).resume(), ""
+    except HopError as error:
+        expired, left = [], str(error)
+    return Restored(float(listed["at"]), left, expired)
 
 
 @contextmanager

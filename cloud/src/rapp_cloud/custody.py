@@ -16,10 +16,11 @@ from rapp_cloud.keys import ROLES, ROOTS
 from rapp_cloud.ledger import Ledger, Lists
 from rapp_hop.errors import Refused
 from rapp_hop.hz.application import Application
-from rapp_hop.hz.standing import KNOWN, YANKED, Standing, package_of, pattern
+from rapp_hop.hz.standing import KNOWN, RESTORED, YANKED, Standing, package_of, pattern
 from rapp_hop.hz.text import check_name
 
 _REVOKED = "revoked"  # in targets: publishers, with their keys and names
+_ROOTS = 8  # written at a resumption: robots may have seen some after the back-up
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ class Custody:
             elif name == "root":
                 self._rotate_root(lists, len(lists.root.roles["root"].keyids), lists.root.roles["root"].threshold)
             elif name in ROLES:
-                self._rotate_role(lists, name)
+                self._rotate_roles(lists, [name])
             elif name in delegated(lists):
                 self._ledger.signer(lists, name)
                 self._rotate_publisher(lists, name)
@@ -153,16 +154,48 @@ class Custody:
             self._ledger.write(lists, ["targets"])
             self._ledger.keys.remove(publisher)
 
-    def _rotate_role(self, lists: Lists, name: str) -> None:
+    def resume(self) -> list[str]:
+        """Have robots believe a store that is older than the one they saw, as after a restore.
+
+        Timestamp and snapshot get new keys, so they drop those they saw (TUF §5.3.11); lists are numbered by the clock, beyond
+        all that were given. Robots that saw more new roots than this writes still refuse; then do it again.
+
+        :return: packages that robots refuse: the list has expired, and its publisher's key is elsewhere
+        :raises Refused: when a key of root or targets is not here, or the passphrase is not; nothing is changed then
+        """
+        with self._ledger.locked():
+            lists, now = self._ledger.read(), datetime.now(UTC)
+            self._ledger.root_signers(lists)
+            self._ledger.signer(lists, "targets")
+            here = [name for name in lists.publishers if self._signs(lists, name)]
+            lists.targets.unrecognized_fields[RESTORED] = now.replace(microsecond=0).isoformat()
+            for signed in (lists.timestamp, lists.snapshot, lists.targets, *(lists.publishers[name] for name in here)):
+                signed.version = max(signed.version, int(now.timestamp()))
+            self._rotate_roles(lists, ["snapshot", "timestamp"], ["targets", *here], _ROOTS)
+            late = {name: own for name, own in lists.publishers.items() if name not in here and own.expires < now}
+            return [f"{path.removesuffix('.hz')} of {name}" for name, own in late.items() for path in sorted(own.targets)]
+
+    def _signs(self, lists: Lists, name: str) -> bool:
+        try:
+            self._ledger.signer(lists, name)
+        except Refused:
+            return False
+        return True
+
+    def _rotate_roles(self, lists: Lists, names: Sequence[str], changed: Sequence[str] = (), roots: int = 1) -> None:
+        """Give roles new keys, and sign their lists and the changed ones anew, below so many new roots."""
         signers, root = self._ledger.root_signers(lists), lists.root
-        new = self._ledger.prepare(lists, name)
-        for keyid in list(root.roles[name].keyids):
-            root.revoke_key(keyid, name)
-        root.add_key(new.public_key, name)
-        root.version += 1
-        self._ledger.write_root(root, signers)
-        self._ledger.settle(name)
-        self._ledger.write(lists, () if name == "timestamp" else [name])
+        for name in names:
+            new = self._ledger.prepare(lists, name)
+            for keyid in list(root.roles[name].keyids):
+                root.revoke_key(keyid, name)
+            root.add_key(new.public_key, name)
+        for _ in range(roots):
+            root.version += 1
+            self._ledger.write_root(root, signers)
+        for name in names:
+            self._ledger.settle(name)
+        self._ledger.write(lists, [*changed, *(name for name in names if name != "timestamp")])
 
     def _rotate_root(self, lists: Lists, keys: int, threshold: int) -> None:
         old, root = self._ledger.root_signers(lists), lists.root

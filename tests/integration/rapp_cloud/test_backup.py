@@ -62,9 +62,10 @@ def _platform(data: Path, url: str | None, tmp_path: Path) -> str:
 
 
 def _content(data: Path, url: str | None) -> dict[str, object]:
+    """All but the store and its keys, which are signed anew and changed at a restore."""
     files = {
         str(path.relative_to(data)): (path.read_bytes(), path.stat().st_mode)
-        for name in KEPT
+        for name in set(KEPT) - {"tuf", "keys"}
         for path in ((data / name).rglob("*") if (data / name).is_dir() else [data / name])
         if path.is_file() and not path.name.startswith(".")
     }

@@ -1,4 +1,4 @@
-"""`./rapp keys list|new|grant|rotate|root|revoke`: who may sign for what in a store; `own`: a publisher's own key, at home."""
+"""`./rapp keys list|new|grant|rotate|root|revoke|resume`: who may sign what in a store; `own`: a publisher's own key, at home."""
 
 import argparse
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 from rapp_cli.errors import UsageError
 from rapp_cli.store.own_key import add_own_options, make_own
 from rapp_cli.store.place import add_store_options, keys_of, store_of, told
+from rapp_cloud.administration import refused_until_renewed
 from rapp_cloud.keys import ROOTS
 from rapp_hop.errors import Invalid
 from rapp_hop.hz.application import Application, read_application
@@ -28,6 +29,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     root.add_argument("--threshold", type=int, default=2, help="how many of them must sign (%(default)s)")
     revoke = actions.add_parser("revoke", help="take a publisher's key away, and all it has signed off offer")
     grant = actions.add_parser("grant", help="give names of RApps to a publisher, for good")
+    resume = actions.add_parser("resume", help="have robots believe a restored store that had newer lists before")
     own = actions.add_parser(
         "own", help="on a publisher's own computer: make the key that stays there, and the file that asks for it"
     )
@@ -36,7 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     grant.add_argument("rapp", nargs="+")
     for action in (new, rotate):
         action.add_argument("--public", type=Path, metavar="FILE", help="of a publisher who has made it with ./rapp keys own")
-    for action in (listing, new, rotate, root, revoke, grant):
+    for action in (listing, new, rotate, root, revoke, grant, resume):
         add_store_options(action)
     add_own_options(own)
 
@@ -59,6 +61,11 @@ def run(options: argparse.Namespace) -> int:
         names = ", ".join(f"{name}.pem" for name in ROOTS[: options.keys])
         print(f"root has {options.keys} keys in {keys_of(options).folder}, {options.threshold} must sign: {names}")
         print("rapp keys: keep them apart, where no one thief and no one fire reaches as many as must sign")
+        return 0
+    if options.action == "resume":
+        for package in custody.resume():
+            print(refused_until_renewed(package))
+        print("robots believe this store; run it again if one that saw many new keys still refuses")
         return 0
     if options.action in ("new", "rotate"):
         (custody.add if options.action == "new" else custody.rotate)(options.name, _application(options))

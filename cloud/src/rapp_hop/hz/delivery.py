@@ -163,7 +163,7 @@ class Delivery:
         try:
             offered = store.versions(wish.name)
             release = choose(offered, wish.name, wish.version, wish.robot.name if wish.robot else None)
-            present = self._present(release, wish)
+            present = self._present(release, wish, offered)
             if present is not None:
                 self.folder.use(present)
                 return present
@@ -174,9 +174,14 @@ class Delivery:
         except OSError as error:
             raise Refused(f"cannot install {wish.name}: {error.strerror}, check the disk") from None
 
-    def _present(self, release: Release, wish: "_Wish") -> Installed | None:
-        """Return what is installed when nothing better is on offer: the newest, or the one before a version that failed."""
+    def _present(self, release: Release, wish: "_Wish", offered: Versions) -> Installed | None:
+        """Return what is installed when nothing better is on offer: the newest, or the one before a version that failed.
+
+        What a restored store does not know any more was verified when it came, and stays until a newer one is on offer.
+        """
         there = self.folder.find(wish.name)
+        if there is not None and wish.version is None and offered.restored and _is_lost(there.version, release, offered):
+            return there
         failed = self.folder.failed(wish.name) if wish.version is None else None
         return there if there is not None and release.version.text in (there.version, failed) else None
 
@@ -208,6 +213,12 @@ class Delivery:
             package.unlink(missing_ok=True)
         tell("installed", version=done.version, path=str(done.path))
         return done
+
+
+def _is_lost(version: str, newest: Release, offered: Versions) -> bool:
+    """Whether a version is newer than all on offer, and the store does not know it."""
+    known = {*offered.yanked, *(release.version.text for release in offered.releases)}
+    return version not in known and parse_version(version).key > newest.version.key
 
 
 @dataclass(frozen=True)

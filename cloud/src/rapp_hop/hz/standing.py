@@ -20,6 +20,7 @@ from rapp_hop.hz.manifest import Manifest
 YANKED = "yanked"  # in a publisher's list: packages that were taken off offer, hashes by path
 KNOWN = "known"  # in targets, by publisher: packages of lists from before a key was revoked, hashes by path
 MAX_LIST = 4_000_000  # bytes of a signed list; TUF's clients take 5 000 000
+RESTORED = "restored"  # in targets: when the store came back out of a back-up, without what was newer
 LASTS = timedelta(days=365)  # that the word of a publisher who keeps their own key is good
 
 

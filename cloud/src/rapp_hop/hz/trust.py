@@ -33,7 +33,7 @@ from rapp_hop.hz.attacks import Attack, Away, Untrusted, translated, untrusted
 from rapp_hop.hz.downloads import partial
 from rapp_hop.hz.lock import held
 from rapp_hop.hz.semver import Version, parse_version
-from rapp_hop.hz.standing import YANKED, Standing
+from rapp_hop.hz.standing import RESTORED, YANKED, Standing
 from rapp_hop.hz.tar import Limits
 from rapp_hop.hz.text import check_name
 from rapp_hop.streaming import Progress, Writer
@@ -42,6 +42,7 @@ __all__ = ["SIGNED_AT", "YANKED", "Attack", "Release", "Transport", "TrustedStor
 
 SIGNED_AT = "signed_at"  # in the timestamp: when it was signed, ISO 8601
 CLOCK_TOLERANCE = timedelta(hours=1)  # by which the robot's clock may be behind the store's
+_ROOTS = 256  # that follow the one which came with the robot; a restored store writes several
 _PATIENCE = 60.0  # seconds for another process that looks at the store
 
 
@@ -74,6 +75,7 @@ class Versions:
 
     releases: tuple[Release, ...]  # in order
     yanked: frozenset[str]  # versions taken off offer
+    restored: bool = False  # the store came back out of a back-up, and may not know versions that it offered after it
 
 
 class TrustedStore:
@@ -101,11 +103,13 @@ class TrustedStore:
         """
         with self._refreshed() as updater:
             releases, yanked = [], set()
-            for targets in self._lists(updater, f"{check_name(name)}-0.hz"):
+            lists = self._lists(updater, f"{check_name(name)}-0.hz")
+            for targets in lists:
                 found = [_release(path, target) for path, target in targets.targets.items()]
                 releases += [item for item in found if item is not None and item.name == name]
                 yanked |= _yanked(targets, name)
-            return Versions(tuple(sorted(releases, key=lambda item: item.version.key)), frozenset(yanked))
+            restored = RESTORED in lists[0].unrecognized_fields
+            return Versions(tuple(sorted(releases, key=lambda item: item.version.key)), frozenset(yanked), restored)
 
     def standings(self, publisher: str | None = None) -> list[Standing]:
         """Refresh the metadata and return how publishers stand who have a name, all lists verified; lists may have expired.
@@ -168,7 +172,7 @@ class TrustedStore:
             metadata_base_url=f"{self._url}/metadata/",
             target_base_url=f"{self._url}/targets/",
             fetcher=self._fetcher,
-            config=UpdaterConfig(max_root_rotations=32),
+            config=UpdaterConfig(max_root_rotations=_ROOTS),
             bootstrap=self._root,
         )
 
