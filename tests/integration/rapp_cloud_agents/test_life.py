@@ -180,8 +180,13 @@ def test_an_agent_whose_time_is_over_is_told_so(tmp_path: Path) -> None:
     in_workshop(tmp_path, test, Limits(life=0.5))
 
 
-def test_an_agent_that_sends_what_is_no_message_is_ended(tmp_path: Path) -> None:
-    code = "facts = os.write(int(os.environ['RAPP_AGENT_CHANNEL']), b'{}\\n' + b'x' * 200_000)"
+@pytest.mark.parametrize(
+    "said",
+    ["b'{}\\n' + b'x' * 200_000", 'b\'{"type": "of its own"}\\n\'', 'b\'{"type": "alive"}\\n\' * 1000'],
+    ids=["no message", "unknown type", "too many"],
+)
+def test_an_agent_that_sends_what_is_no_message_is_ended(tmp_path: Path, said: str) -> None:
+    code = f"facts = os.write(int(os.environ['RAPP_AGENT_CHANNEL']), {said}); time.sleep(60)"
 
     async def test(shop: Workshop) -> None:
         agent = await shop.start()

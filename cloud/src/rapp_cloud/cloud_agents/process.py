@@ -31,8 +31,10 @@ from rapp_hop.relay import relay
 
 AGENT_SOCKET = "agent.socket"
 BACKLOG = 64  # connections that wait to be taken
+MESSAGES = 64, 4.0  # of an agent: at once, and each second; it sends one a second
 NOTICE = 0.5  # s in which an end is seen that has cut a call
 
+_TYPES = frozenset({"ready", "serving", "failed", "alive"})
 _log = logging.getLogger(__name__)
 
 
@@ -61,6 +63,7 @@ class LocalAgent:
         self._place = place  # the root folder: sockets are reached through it, for their paths may only have 107 bytes
         self._platform: Closable | None = None
         self._said: dict[str, asyncio.Future[dict[str, Any]]] = {}
+        self._messages = 0  # since it began
         self._heard = self._begun = time.monotonic()
         self._excess = ""
         self._stopping: asyncio.Task[None] | None = None
@@ -112,6 +115,7 @@ class LocalAgent:
         :raises Unreachable: it takes too long
         """
         self.name = order.name
+        self._messages = 0
         self._heard = self._begun = time.monotonic()
         self._platform = serve(order.robot, order.services, Path(f"/proc/self/fd/{self._place}/platform/{PLATFORM_SOCKET}"))
         self._channel.send(
@@ -175,12 +179,22 @@ class LocalAgent:
     async def _read(self) -> None:
         try:
             while (message := await self._channel.receive()) is not None:
-                self._heard = time.monotonic()
-                future = self._said.setdefault(message["type"], asyncio.get_running_loop().create_future())
-                if not future.done():
-                    future.set_result(message)
+                self._take_message(message)
         except Invalid as error:
             self._excess = f"its channel: {error}"
+
+    def _take_message(self, message: dict[str, Any]) -> None:
+        """Keep the first message of each known type. Raises Invalid."""
+        self._heard = time.monotonic()
+        self._messages += 1
+        at_once, a_second = MESSAGES
+        if message["type"] not in _TYPES or self._messages > at_once + a_second * (self._heard - self._begun):
+            raise Invalid("it sent what no cloud agent says, or too many messages")
+        if message["type"] == "alive":
+            return
+        future = self._said.setdefault(message["type"], asyncio.get_running_loop().create_future())
+        if not future.done():
+            future.set_result(message)
 
     def _last_words(self) -> str:
         text = self.folders.log.read_text(errors="replace")[-2000:] if self.folders.log.exists() else ""
