@@ -3,6 +3,8 @@
 from typing import Any
 from urllib.parse import urlsplit
 
+import rospy
+
 from rapp_bridge.errors import Unreachable
 from rapp_ros.master import MasterAwayError, ask
 
@@ -57,3 +59,15 @@ class Master:
             return ask(self._uri, self._timeout, question, self._caller, *words)
         except MasterAwayError as error:
             raise Unreachable(str(error)) from error
+
+
+def publishes(node: str, topic: str, seconds: float) -> tuple[str, int] | None:
+    """Where the node of this URI publishes a topic by TCPROS; None when it does not. Raises Unreachable. Blocks.
+
+    wiki.ros.org/ROS/Slave_API, requestTopic.
+    """
+    try:
+        code, _, words = ask(node, seconds, "requestTopic", rospy.get_name(), topic, [["TCPROS"]])
+    except MasterAwayError as error:
+        raise Unreachable(str(error)) from error
+    return (str(words[1]), int(words[2])) if code == 1 and words else None

@@ -4,7 +4,8 @@ import asyncio
 import logging
 import time
 from collections import deque
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Coroutine
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +19,7 @@ from rapp_bridge.config import Config
 from rapp_bridge.decoding import Raw
 from rapp_bridge.errors import Invalid, Unreachable
 from rapp_bridge.links import Outgoing
-from rapp_bridge.master import Master
+from rapp_bridge.master import Master, publishes
 from rapp_bridge.node import Marker
 from rapp_bridge.pace import Pace
 from rapp_bridge.protocol import Subscribe, Unsubscribe
@@ -80,6 +81,11 @@ class _Source:
     latest: Arrival | None = None
     cls: Any = None  # what its messages are; None: not known, or not the type that the clients want
     latched: bool = False
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the link ends, or rospy has asked for its end."""
+        return not self.link.is_open or (self.marker is not None and self.marker.done)
 
 
 @dataclass(eq=False)
@@ -210,10 +216,18 @@ class Subscriptions:
 
     def _connect(self, name: str, publisher: str, address: tuple[str, int]) -> None:
         entry = self._subscribed.get(name)
-        if entry is not None and publisher not in entry.sources:
-            task = self._loop.create_task(self._connect_to(entry, publisher, address))
-            self._connecting.add(task)
-            task.add_done_callback(self._connecting.discard)
+        if entry is None:
+            return
+        held = entry.sources.get(publisher)
+        if held is not None and held.is_over:  # it has registered again, and the loop was too busy to see the old link end
+            self._lost(entry, publisher, held)
+        if publisher not in entry.sources:
+            self._work(self._connect_to(entry, publisher, address))
+
+    def _work(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        task = self._loop.create_task(coroutine)
+        self._connecting.add(task)
+        task.add_done_callback(self._connecting.discard)
 
     async def _connect_to(self, entry: _Subscribed, publisher: str, address: tuple[str, int]) -> None:
         for pause in RETRY:
@@ -263,9 +277,18 @@ class Subscriptions:
                 f"cannot read {entry.name} of {fields.get('callerid')}: it is {fields.get('type')}, not the {kind} known here"
             )
 
-    @staticmethod
-    def _lost(entry: _Subscribed, publisher: str, source: _Source) -> None:
+    def _lost(self, entry: _Subscribed, publisher: str, source: _Source) -> None:
         if entry.sources.get(publisher) is source:
             del entry.sources[publisher]
-        if source.marker is not None:
+        if source.marker is not None and not source.marker.done:
             source.marker.close()
+            self._work(self._ask_again(entry, publisher))
+
+    async def _ask_again(self, entry: _Subscribed, publisher: str) -> None:
+        """The publisher has closed the link. It may publish on: rospy tells of it again only when it was gone from its lists."""
+        await asyncio.sleep(RETRY[0])
+        if self._subscribed.get(entry.name) is entry:
+            with suppress(Unreachable):
+                address = await self._blocking.run(publishes, publisher, entry.name, self._config.probe_timeout)
+                if address is not None:
+                    self._connect(entry.name, publisher, address)

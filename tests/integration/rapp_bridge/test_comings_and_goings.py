@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from fakes.bridge_neighbours import PATIENCE, Clients, Peer, Socket, node
+from fakes.bridge_puppet import Puppet, puppet
 
 LOADS = 12
 
@@ -66,6 +67,23 @@ async def echoes(clients: Clients, listener: Socket) -> None:
     while await asyncio.wait({last}, timeout=0.5) and last.done():  # what was said meanwhile
         last = asyncio.create_task(listener.receive("publish"))
     last.cancel()
+
+
+def test_a_publisher_whose_connection_breaks_while_it_stays_registered_is_heard_again(
+    clients: Clients, ros_env: dict[str, str]
+) -> None:
+    async def story(node: Puppet) -> None:
+        async with clients:
+            listener = await clients.new()
+            await listener.send(op="subscribe", topic="/broken", type="std_msgs/String")
+            assert (await listener.receive("publish"))["msg"] == {"data": "kept"}
+            node.do("[each.socket.shutdown(2) for each in publisher.impl.connections]")
+            assert (await listener.receive("publish"))["msg"] == {"data": "kept"}  # it is latched, so a new connection has it again
+
+    with puppet(ros_env, "breaking") as breaking:
+        breaking.do("publisher = rospy.Publisher('/broken', String, latch=True, queue_size=1)")
+        breaking.do("publisher.publish('kept')")
+        asyncio.run(story(breaking))
 
 
 def test_a_master_that_goes_away_and_comes_back_is_survived(start: Any, own_master: Any) -> None:
