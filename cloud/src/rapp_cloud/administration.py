@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rapp_cloud.backup import back_up, restore
+from rapp_cloud.backup import back_up, passphrase_of, restore
 from rapp_cloud.config import load_config
-from rapp_cloud.keys import passphrase_from
+from rapp_cloud.keys import Passphrase, passphrase_from
 from rapp_cloud.memory import Memory, open_memory
 from rapp_cloud.people_commands import add_actions
 from rapp_hop.errors import Refused
@@ -29,11 +29,16 @@ def _database(data: Path) -> str | None:
 
 
 def _backup(words: list[str]) -> int:
-    parser = _parser("backup", "Write all that a platform keeps into one file; its secrets too.")
+    parser = _parser(
+        "backup", "Write all that a platform keeps into one file; its secrets too, but not the passphrase of the store's keys."
+    )
     parser.add_argument("file", type=Path, metavar="FILE")
     options = parser.parse_args(words)
-    length = back_up(options.data, _database(options.data), options.file)
+    config, word = load_config(options.data, {}, os.environ), passphrase_of(options.file)
+    length = back_up(options.data, config.database, options.file, Passphrase(config.passphrase, config.passphrase_file))
     print(f"{options.file}: {length} bytes; keep it where nobody else can read it")
+    kept = word if word.exists() else "it"
+    print(f"the passphrase of the store's keys is not in it, and nothing opens them without: keep {kept} too, apart")
     return 0
 
 

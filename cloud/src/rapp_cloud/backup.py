@@ -1,8 +1,9 @@
 """Back-up and restore of a whole platform: every table, the store with its keys, settings, in one file.
 
 The tables are written as JSON lines, so a back-up of SQLite can be restored into PostgreSQL and the other way round. The file
-holds the platform's secrets: its mode is 0600. Taken while the platform serves, it is one state of the database and one of
-the store. Blocking.
+holds the platform's secrets: its mode is 0600. The passphrase of the store's keys is not in it, else it would be worth nothing
+there; one that lies beside the keys goes into a file of its own, to be kept apart. Taken while the platform serves, a back-up is
+one state of the database and one of the store. Blocking.
 """
 
 import hashlib
@@ -13,7 +14,7 @@ import secrets
 import shutil
 import tarfile
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -23,7 +24,8 @@ import sqlalchemy as sa
 
 from rapp_cloud.custody import Custody
 from rapp_cloud.database.engine import FILE, Database
-from rapp_cloud.keys import KeyRing, Passphrase
+from rapp_cloud.files import copy_whole
+from rapp_cloud.keys import BESIDE, KeyRing, Passphrase
 from rapp_cloud.ledger import Ledger
 from rapp_cloud.memory import url_of
 from rapp_hop.errors import HopError, Invalid, Refused
@@ -47,9 +49,15 @@ class Restored:
     expired: list[str]  # see `Custody.resume`
 
 
-def back_up(data: Path, url: str | None, file: Path) -> int:
-    """Write a back-up; return its length in bytes.
+def passphrase_of(file: Path) -> Path:
+    """Return where the passphrase of a back-up's keys is, if the platform kept it beside them."""
+    return file.with_name(f"{file.name}.{BESIDE}")
 
+
+def back_up(data: Path, url: str | None, file: Path, passphrase: Passphrase | None = None) -> int:
+    """Write a back-up, and `passphrase_of` it when there is one to be written; return the back-up's length in bytes.
+
+    :param passphrase: of the store's keys; its file stays out of the back-up wherever it is
     :raises Refused: when there is no platform, or the file cannot be written
     :raises HopError: see `Database.reading`
     """
@@ -60,7 +68,9 @@ def back_up(data: Path, url: str | None, file: Path) -> int:
     try:
         database.migrate()
         with _private(aside) as raw, held(data / "tuf" / ".lock", "back up"):
-            _write(raw, data, database)
+            _write(raw, data, database, passphrase.file if passphrase else None)
+        if (data / "keys" / BESIDE).exists():
+            copy_whole(data / "keys" / BESIDE, passphrase_of(file), mode=0o600)
         aside.replace(file)
     except OSError as error:
         raise Refused(f"cannot write {file}: {error.strerror}, choose another place") from None
@@ -73,7 +83,7 @@ def back_up(data: Path, url: str | None, file: Path) -> int:
 def restore(data: Path, url: str | None, file: Path, passphrase: Passphrase | None = None) -> Restored:
     """Make a platform of a back-up, where none is, and have robots believe it again (`Custody.resume`).
 
-    :param passphrase: of the store's keys
+    :param passphrase: of the store's keys; when nobody names one, that of `passphrase_of` is put beside them
     :raises Refused: when there is a platform already, or the file cannot be read
     :raises Invalid: when the back-up is damaged; nothing has been made then
     """
@@ -99,11 +109,16 @@ def restore(data: Path, url: str | None, file: Path, passphrase: Passphrase | No
     finally:
         shutil.rmtree(aside, ignore_errors=True)
         database.close()
+    return _resumed(data, passphrase or Passphrase(), passphrase_of(file), float(listed["at"]))
+
+
+def _resumed(data: Path, passphrase: Passphrase, given: Path, at: float) -> Restored:
     try:
-        expired, left = Custody(Ledger(data / "tuf" / "metadata", KeyRing(data / "keys", passphrase))).resume(), ""
-    except HopError as error:
-        expired, left = [], str(error)
-    return Restored(float(listed["at"]), left, expired)
+        if passphrase == Passphrase() and given.exists() and not (data / "keys" / BESIDE).exists():
+            copy_whole(given, data / "keys" / BESIDE, mode=0o600)
+        return Restored(at, "", Custody(Ledger(data / "tuf" / "metadata", KeyRing(data / "keys", passphrase))).resume())
+    except (HopError, OSError) as error:
+        return Restored(at, str(error), [])
 
 
 @contextmanager
@@ -114,7 +129,7 @@ def _private(path: Path) -> Iterator[IO[bytes]]:
         os.fsync(file.fileno())
 
 
-def _write(raw: IO[bytes], data: Path, database: Database) -> None:
+def _write(raw: IO[bytes], data: Path, database: Database, secret: Path | None) -> None:
     listed: dict[str, Any] = {"format": FORMAT, "at": time.time(), "tables": {}, "files": {}}
     with tarfile.open(fileobj=raw, mode="w:gz", compresslevel=6) as archive, database.reading() as connection:
         listed["revision"] = connection.execute(sa.text("SELECT version_num FROM alembic_version")).scalar_one()
@@ -122,7 +137,7 @@ def _write(raw: IO[bytes], data: Path, database: Database) -> None:
             rows = [dict(row._mapping) for row in connection.execute(sa.select(table))]
             listed["tables"][table.name] = len(rows)
             _add(archive, listed, f"tables/{table.name}.jsonl", "".join(json.dumps(row) + "\n" for row in rows).encode())
-        for path in _files(data):
+        for path in _files(data, {data / "keys" / BESIDE, secret and secret.resolve()}):
             _add(archive, listed, f"data/{path.relative_to(data)}", path.read_bytes(), path.stat().st_mode & 0o777)
         text = json.dumps(listed).encode()
         _add(archive, listed, _LIST, text)
@@ -135,11 +150,12 @@ def _add(archive: tarfile.TarFile, listed: dict[str, Any], name: str, content: b
     listed["files"][name] = hashlib.sha256(content).hexdigest()
 
 
-def _files(data: Path) -> Iterator[Path]:
+def _files(data: Path, without: Collection[Path | None]) -> Iterator[Path]:
     for name in KEPT:
         path = data / name
         found = sorted(path.rglob("*")) if path.is_dir() else [path]
-        yield from (one for one in found if one.is_file() and not one.is_symlink() and not one.name.startswith("."))
+        kept = (one for one in found if one.is_file() and not one.is_symlink() and not one.name.startswith("."))
+        yield from (one for one in kept if not {one, one.resolve()} & {*without})
 
 
 def _unpack(file: Path, aside: Path) -> dict[str, Any]:

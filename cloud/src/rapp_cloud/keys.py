@@ -28,6 +28,7 @@ from rapp_hop.hz.text import check_name
 
 ROLES = ("root", "targets", "snapshot", "timestamp")
 ROOTS = ("root", *(f"root_{number}" for number in range(2, 10)))  # the root may have several keys
+BESIDE = "passphrase"  # the file beside the keys
 PASSPHRASE, PASSPHRASE_FILE = "RAPP_CLOUD_PASSPHRASE", "RAPP_CLOUD_PASSPHRASE_FILE"
 _SHORTEST = 16  # characters of a passphrase: PKCS 8 makes guessing hardly slower
 _LONGEST = 1024  # bytes
@@ -124,7 +125,7 @@ class KeyRing:
     def _word(self, *, make: bool = False) -> bytes:
         if self._passphrase.text is not None:
             return _checked(self._passphrase.text.encode(), PASSPHRASE)
-        path = self._passphrase.file or self.folder / "passphrase"
+        path = self._passphrase.file or self.folder / BESIDE
         if make and self._passphrase.file is None and not path.exists() and self._all_plain():
             write_whole(path, secrets.token_urlsafe(32).encode(), mode=0o600)
         try:

@@ -2,6 +2,7 @@
 
 import asyncio
 import shutil
+import tarfile
 from datetime import timedelta
 from pathlib import Path
 
@@ -13,9 +14,9 @@ from fakes.publisher import Publisher
 from fakes.store_client import StoreClient
 from rapp_cli.__main__ import main as rapp
 from rapp_cloud.app import open_shelf
-from rapp_cloud.backup import Restored, back_up, restore
+from rapp_cloud.backup import Restored, back_up, passphrase_of, restore
 from rapp_cloud.custody import _ROOTS
-from rapp_cloud.keys import ROLES
+from rapp_cloud.keys import ROLES, Passphrase
 from rapp_cloud.shelf import Shelf
 from rapp_hop.hz.archive import build
 from rapp_hop.hz.delivery import Delivery
@@ -147,3 +148,40 @@ def test_the_power_goes_while_robots_are_to_believe_it_again(home: _Home) -> Non
         shelf.custody.resume()
         assert home.robot_gets(home.again, "hello", f"robot {writes}").version == "1.0.0"
         home.robot_gets(home.again, "hello")
+
+
+def _held(file: Path) -> bytes:
+    """All that is in a back-up."""
+    with tarfile.open(file) as archive:
+        return b"".join(body.read() for member in archive if (body := archive.extractfile(member)))
+
+
+def test_a_back_up_alone_opens_no_key(home: _Home, capsys: pytest.CaptureFixture[str]) -> None:
+    word = passphrase_of(home.file)
+    secret = (home.cloud / "keys" / "passphrase").read_bytes()
+    assert secret not in _held(home.file)
+    assert (word.read_bytes(), word.stat().st_mode & 0o777) == (secret, 0o600)
+    away = word.rename(home.folder / "away")
+    assert rapp(["cloud", "--data", str(home.again), "restore", str(home.file)]) == 1
+    told = capsys.readouterr().err
+    assert "cannot read the passphrase" in told and "RAPP_CLOUD_PASSPHRASE_FILE" in told and "./rapp keys resume" in told
+    away.rename(home.again / "keys" / "passphrase")
+    assert rapp(["keys", "resume", "--data", str(home.again)]) == 0
+    assert home.robot_gets(home.again, "hello").new
+
+
+def test_a_passphrase_of_the_owner_s_stays_out_wherever_its_file_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cloud, again, file = tmp_path / "cloud", tmp_path / "again", tmp_path / "backup"
+    word = cloud / "keys" / "word"
+    word.parent.mkdir(parents=True)
+    word.write_text("correct horse battery staple")
+    word.chmod(0o600)
+    open_shelf(cloud, Passphrase(file=word)).create()
+    monkeypatch.setenv("RAPP_CLOUD_PASSPHRASE_FILE", str(word))
+    assert rapp(["cloud", "--data", str(cloud), "backup", str(file)]) == 0
+    assert b"correct horse" not in _held(file)
+    assert not passphrase_of(file).exists()
+    assert rapp(["cloud", "--data", str(again), "restore", str(file)]) == 0
+    assert not (again / "keys" / "passphrase").exists()
+    monkeypatch.delenv("RAPP_CLOUD_PASSPHRASE_FILE")
+    assert restore(tmp_path / "third", None, file).left.startswith("cannot read the passphrase")
