@@ -64,6 +64,12 @@ def make_platform(data: Path, robot: str) -> None:
         raise CommandError(f"cannot make the platform's keys in {data}: {made.stderr.strip()}")
 
 
+def contacts_with(name: str, address: str) -> dict[str, str]:
+    """The user's contacts and one more, who takes the place of one of the same name."""
+    others = {known: known_address for known, known_address in CONTACTS.items() if known.casefold() != name.casefold()}
+    return {name: address, **others}
+
+
 def write_profile(data: Path, robot: str, contacts: Mapping[str, str]) -> None:
     """Write down the robot's user for the platform to take over: who they are, whom they write to (name to mail address)."""
     listed = [{"name": name, "address": address} for name, address in contacts.items()]

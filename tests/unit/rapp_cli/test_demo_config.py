@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from rapp_cli.cloud import CONTACTS, contacts_with
 from rapp_cli.demo.config import HAZARD, KEYWORDS, SENTENCES, SHOW_AROUND, VOICE_MAIL, DemoConfig, add_options, read
 from rapp_cli.errors import UsageError
 
@@ -34,6 +35,19 @@ def test_a_recipient_of_any_spelling_gets_a_mail_address() -> None:
 def test_a_real_account_needs_a_real_recipient() -> None:
     with pytest.raises(UsageError, match="--address"):
         config("--smtp-host", "smtp.example.org")
+
+
+@pytest.mark.parametrize(("words", "env"), [(("--cloud", "https://x.example"), {}), ((), {"RAPP_CLOUD": "https://x.example"})])
+def test_a_platform_that_runs_already_knows_the_address_itself(words: tuple[str, ...], env: dict[str, str]) -> None:
+    assert config("--smtp-host", "smtp.example.org", *words, env=env).address == ""
+    with pytest.raises(UsageError, match="rapp cloud person contact"):
+        config("--address", "me@real.example", *words, env=env)
+
+
+@pytest.mark.parametrize("name", ["Margaret", "margaret"])
+def test_the_recipients_address_goes_before_that_of_a_contact_of_the_same_name(name: str) -> None:
+    wished = config("--recipient", f"{name} ", "--address", "me@real.example")
+    assert contacts_with(wished.recipient, wished.address) == {name: "me@real.example", "Doctor Nowak": CONTACTS["Doctor Nowak"]}
 
 
 def test_a_real_account_comes_from_options_before_environment() -> None:

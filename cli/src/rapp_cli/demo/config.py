@@ -38,7 +38,7 @@ class DemoConfig:
     robot: str | None  # URL of a real robot's NAOqi, None for the simulator
     cloud: str | None  # URL of a platform that runs already, None for one of the demo's own
     mail: MailAccount | None  # None for the demo's own mail server
-    address: str  # the recipient's mail address
+    address: str  # the recipient's mail address; "" when a platform that runs already knows it
     timeout: float  # s, for the whole story
     obstacle: bool  # something stands in the way of the tour
     silent: bool  # the simulated robot is fed with text, and speaks without sound
@@ -79,8 +79,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> DemoConfig:
     """Build the configuration; raises UsageError when options contradict each other."""
-    account = mail_account.read(options, env)
-    if account and not options.address:
+    account, cloud = mail_account.read(options, env), options.cloud or env.get("RAPP_CLOUD")
+    if cloud and options.address:
+        raise UsageError("cannot use --address with --cloud: that platform knows it; ./rapp cloud person contact changes it there")
+    if account and not options.address and not cloud:
         raise UsageError("cannot use a real mail account without a real recipient: give --address NAME@DOMAIN")
     _check_story(options, env)
     if not options.recipient.strip() or not options.message.strip():
@@ -89,13 +91,13 @@ def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> De
         story=options.story,
         folder=(options.folder or _new_folder()).resolve(),
         command=options.say or (SENTENCES if options.long else KEYWORDS)[options.story],
-        recipient=options.recipient,
+        recipient=options.recipient.strip(),
         message=options.message,
         voice=options.voice,
         robot=options.robot or env.get("RAPP_ROBOT"),
-        cloud=options.cloud or env.get("RAPP_CLOUD"),
+        cloud=cloud,
         mail=account,
-        address=options.address or f"{_mailbox(options.recipient)}@home.example",
+        address="" if cloud else options.address or f"{_mailbox(options.recipient)}@home.example",
         timeout=options.timeout or TIMEOUTS.get(options.story, TIMEOUT),
         obstacle=options.obstacle,
         silent=options.silent,

@@ -7,7 +7,16 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rapp_cli.cloud import CONTACTS, Cloud, foreign_cloud, link_environment, make_platform, own_cloud, own_rapps, write_profile
+from rapp_cli.cloud import (
+    Cloud,
+    contacts_with,
+    foreign_cloud,
+    link_environment,
+    make_platform,
+    own_cloud,
+    own_rapps,
+    write_profile,
+)
 from rapp_cli.demo.config import DemoConfig
 from rapp_cli.mail_account import MailAccount
 from rapp_cli.paths import ROBOT_SCRIPTS
@@ -61,7 +70,7 @@ async def _cloud(config: DemoConfig, sources: Sequence[Path], children: Children
         return foreign_cloud(config.cloud, os.environ)
     data = config.folder / "cloud"
     make_platform(data, ROBOT_NAME)
-    write_profile(data, ROBOT_NAME, {config.recipient: config.address, **CONTACTS})
+    write_profile(data, ROBOT_NAME, contacts_with(config.recipient, config.address))
     rapps = [word for folder in sources for word in ("--publish", str(folder))]
     words = [sys.executable, "-m", "rapp_cloud", "--port", "0", "--data", str(data), *rapps]
     ready = await children.start(Child("cloud", words, confided(os.environ, CLOUD), logs / "cloud.log"))
