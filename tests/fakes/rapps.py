@@ -67,9 +67,11 @@ def install_rapp(home: Path, name: str, body: str = "pass", **rapp: Any) -> Path
 
 
 def write_four_agent_rapp(folder: Path, name: str, body: str, program: str, cloud: tuple[str, ...] = (), **rapp: Any) -> list[Path]:
-    """The two packages of a four-agent RApp; `program` is its cloud agent's, which may call the platform's services `cloud`."""
-    dynamic = write_rapp(folder / name / "dynamic", name, body, partner=f"{name}_cloud", **rapp)
+    """The two packages of a four-agent RApp, the cloud agent's first.
+
+    `program` is its cloud agent's, which may call the platform's services `cloud`.
+    """
     return [
-        dynamic,
         write_cloud_agent(folder / name / "cloud", f"{name}_cloud", program, permissions={"core": [], "cloud": list(cloud)}),
+        write_rapp(folder / name / "dynamic", name, body, partner=f"{name}_cloud", **rapp),
     ]

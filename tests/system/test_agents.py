@@ -71,7 +71,6 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WholeRobot]:
         *write_four_agent_rapp(folder, "four", FOUR, LOOKER, ("profile",), permissions=core),
         *write_four_agent_rapp(folder, "waiter", WAITER, LOOKER, permissions=core),
         *write_four_agent_rapp(folder, "broken", "self.pause(1000)", "raise ValueError('on purpose')", permissions=core),
-        write_rapp(folder / "alone", "alone", "pass", partner="nowhere"),
     ]
     for package in packages:
         program = package / "agent.py"
@@ -174,5 +173,4 @@ def test_cloud_packages_are_neither_listed_nor_installed(robot: WholeRobot) -> N
     installed = {path.name for path in (robot.home / "rapps").iterdir() if not path.name.startswith(".")}
     assert "three" in installed and not [name for name in installed if name.endswith("_cloud")]
     listed = {rapp["name"]: rapp for rapp in json.loads(Path(robot.home / "link" / "rapps.json").read_text())["rapps"]}
-    assert set(listed) == {"three", "four", "waiter", "broken", "alone"}
-    assert listed["alone"]["reasons"] == ["its cloud agent nowhere 1.0.0 is not in the store"]
+    assert set(listed) == {"three", "four", "waiter", "broken"}

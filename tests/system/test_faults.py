@@ -28,6 +28,7 @@ ENTRY = {
     "fine": "communication.rapp_say('fine')",
 }
 PERMISSIONS = {"core": ["rapp_say", "rapp_record"], "cloud": ["profile"]}
+TWINS = {"castor": "please start one of the twins", "pollux": "start one of the twins please"}
 SLOW_TO_START = "import time\ntime.sleep(1.5)\n"
 SLOW_TO_END = "\n    def dismantle(self) -> None:\n        self.pause(1.5)\n"
 
@@ -67,7 +68,7 @@ def long_command(robot: WholeRobot) -> None:
 
 def ambiguous_command(robot: WholeRobot) -> None:
     since = len(robot.seen)
-    robot.room("personSay", "please start one of the twins", "en-us+m3")
+    robot.room("personSay", TWINS["castor"], "en-us+m3")
     robot.until(entered("s12"), since)
 
 
@@ -112,8 +113,7 @@ def rapps(folder: Path) -> list[Path]:
     slow_to_end = write_rapp(folder / "end", "slow_to_end", "pass", ("slow to end",))
     agent = slow_to_end / "agent.py"
     agent.write_text(agent.read_text() + SLOW_TO_END)
-    sentences = {"en": ["please start one of the twins"]}
-    twins = [write_rapp(folder / name, name, "pass", sentences=sentences) for name in ("castor", "pollux")]
+    twins = [write_rapp(folder / name, name, "pass", sentences={"en": [sentence]}) for name, sentence in TWINS.items()]
     return [*made, fresh, slow_to_start, slow_to_end, *twins]
 
 

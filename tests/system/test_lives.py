@@ -57,7 +57,7 @@ def rapps(folder: Path) -> list[Path]:
         "    except RappError as error:\n        communication.rapp_say(type(error).__name__)\n    self.pause(1)"
     )
     orphan = write_four_agent_rapp(folder, "orphan", alone, dies, permissions=PERMISSIONS)
-    agent = orphan[0] / "agent.py"
+    agent = orphan[1] / "agent.py"
     agent.write_text(agent.read_text().replace("import DynamicAgent,", "import DynamicAgent, RappError,"))
     slow = write_rapp(folder / "slow", "slow", "self.pause(0.5)", permissions=PERMISSIONS)
     agent = slow / "agent.py"

@@ -22,14 +22,14 @@ listening_round = 1.0
 catalogue_again = 1.0
 """
 PERSON = "en-us+m3"
-PLAY = "play a game with me"
+PLAY = {"chess": "play a game with me", "draughts": "please play a game with me"}
 QUIET, LOUD = 60.0, 1500.0  # RMS of the room's noise; speech has about 2000
 
 
 def rapps(folder: Path) -> list[Path]:
     games = [
-        write_rapp(folder / name, name, f"communication.rapp_say('{name}')", sentences={"en": [PLAY, f"I want to play {name}"]})
-        for name in ("chess", "draughts")
+        write_rapp(folder / name, name, f"communication.rapp_say('{name}')", sentences={"en": [play, f"I want to play {name}"]})
+        for name, play in PLAY.items()
     ]
     return [*games, write_rapp(folder / "fine", "fine", "communication.rapp_say('fine')"), STORE / "voice_mail"]
 

@@ -30,7 +30,7 @@ ENTRY = {
 PERMISSIONS = {"core": ["rapp_say", "rapp_recognize", "rapp_record"], "cloud": ["profile"]}
 SERVICE = "from rapp_hop.cloud_agent import service\n\n\n@service\ndef quick() -> str:\n    return 'quick'\n"
 NEW = ("fresh", "unused")  # RApps that no case before has had downloaded
-TWINS = "please start one of the twins"
+TWINS = {"castor": "please start one of the twins", "pollux": "start one of the twins please"}
 FINE = "would you be so kind and run the program that is fine"
 
 
@@ -41,7 +41,7 @@ def rapps(folder: Path) -> list[Path]:
     (slow / "agent.py").write_text("import time\ntime.sleep(60)\n" + (slow / "agent.py").read_text())
     ends = write_rapp(folder / "ends", "ends", "pass")
     (ends / "agent.py").write_text((ends / "agent.py").read_text() + "\n    def dismantle(self) -> None:\n        self.pause(60)\n")
-    made += [write_rapp(folder / name, name, "pass", sentences={"en": [TWINS]}) for name in ("castor", "pollux")]
+    made += [write_rapp(folder / name, name, "pass", sentences={"en": [sentence]}) for name, sentence in TWINS.items()]
     body = "cloud.call_agent_wait('quick')\ncommunication.rapp_say('here')\nself.pause(60)"
     return [*made, slow, ends, *write_four_agent_rapp(folder, "four", body, SERVICE, permissions=PERMISSIONS)]
 
@@ -207,7 +207,7 @@ def test_l11_s10_a_rapp_that_takes_its_time_to_end_is_not_waited_for(robot: Whol
 @both
 def test_l11_s12_a_question_is_given_up(robot: WholeRobot, stop: Stop) -> None:
     since = len(robot.seen)
-    command(robot, TWINS)
+    command(robot, TWINS["castor"])
     assert states(stop_at(robot, stop, since, entered("s12"))) == ["s12", "s11", "s3"]
 
 

@@ -5,7 +5,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator
 
 from rapp_hop.errors import Invalid, Refused
-from rapp_hop.hz.manifest import Manifest
+from rapp_hop.hz.manifest import STOP, Manifest
 
 _NO_WORD = re.compile(r"[^\w]+|_")
 
@@ -29,14 +29,15 @@ def check_publication(manifest: Manifest, offered: Iterable[Manifest]) -> None:
 
 
 def collisions(manifest: Manifest, offered: Iterable[Manifest]) -> list[str]:
-    """Return which words of a RApp are those of another one's newest version, compared as they are spoken."""
+    """Return which words of a RApp are the robot's own or of another one's newest version, compared as they are spoken."""
     newest: dict[str, Manifest] = {}
     for other in offered:
         if other.name != manifest.name and (other.name not in newest or newest[other.name].version < other.version):
             newest[other.name] = other
-    taken = {spoken: other.name for other in newest.values() for spoken in _spoken(other)}
+    taken = {spoken: f"for {other.name}" for other in newest.values() for spoken in _spoken(other)}
+    taken |= {(language, _plain(word)): "to stop the robot" for language, word in STOP.items()}
     return [
-        f"{text!r} ({language}) is what one says for {taken[language, plain]}"
+        f"{text!r} ({language}) is what one says {taken[language, plain]}"
         for (language, plain), text in _spoken(manifest).items()
         if (language, plain) in taken
     ]

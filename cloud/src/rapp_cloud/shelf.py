@@ -7,7 +7,7 @@ beside the server. Blocking. Who signs what: `ledger`, `custody`, `keys`.
 import hashlib
 import io
 import logging
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,6 +20,7 @@ from rapp_cloud.files import write_whole
 from rapp_cloud.keys import ROLES, KeyRing, Passphrase
 from rapp_cloud.ledger import Expiry, Ledger, Lists
 from rapp_cloud.packages import PackageFiles
+from rapp_cloud.publishing import check_publication
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.archive import extract, inspect, package_file_name
 from rapp_hop.hz.manifest import Manifest, check_numbers
@@ -29,7 +30,6 @@ from rapp_hop.hz.tar import Limits
 __all__ = ["Expiry", "Offer", "Shelf"]
 
 PUBLISHER = "rapp"  # who publishes where nobody else is named
-Check = Callable[[Manifest, list[Manifest]], None]  # of a package against those on offer; raises what is wrong
 _log = logging.getLogger(__name__)
 
 
@@ -119,16 +119,14 @@ class Shelf:
             delegated(lists)[PUBLISHER].paths = [pattern(name) for name in names]
             self._ledger.write(lists, ["targets", PUBLISHER])
 
-    def publish(
-        self, package: bytes, publisher: str | None = None, robots: tuple[str, ...] = (), check: Check | None = None
-    ) -> Manifest:
+    def publish(self, package: bytes, publisher: str | None = None, robots: tuple[str, ...] = ()) -> Manifest:
         """Check a package, sign for it as its publisher and offer it. The same bytes again change nothing.
 
         :param publisher: None: whose name it is, or `PUBLISHER`
         :param robots: names of the only robots it is for; none: all
-        :param check: what else must hold beside the packages on offer
         :raises Invalid: when it is not a right package
-        :raises Refused: when this version was published with other bytes (S20), or the name is another's
+        :raises Refused: when this version was published with other bytes (S20), the name is another's, or it may not
+            stand beside the packages on offer (`check_publication`)
         """
         contents = inspect(io.BytesIO(package), self._limits)
         manifest = contents.manifest
@@ -144,8 +142,7 @@ class Shelf:
                 raise Refused(f"cannot publish {path}: published with other bytes before, raise its version")
             if path in own.targets:
                 return manifest
-            if check is not None:
-                check(manifest, [offer.manifest for offer in self._offers(lists)])
+            check_publication(manifest, [offer.manifest for offer in self._offers(lists)])
             target = TargetFile.from_data(path, package, ["sha256"])
             target.unrecognized_fields["custom"] = custom_of(manifest, robots)
             own.targets[path] = target

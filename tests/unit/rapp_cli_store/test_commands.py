@@ -73,7 +73,8 @@ def test_new_never_writes_over_anything(tmp_path: Path) -> None:
 
 def test_a_word_of_another_rapp_is_refused(desk: Desk, tmp_path: Path) -> None:
     desk.does("publish", source_folder(tmp_path))
-    assert "'hello' (en) is what one says for hello" in desk.refuses("publish", source_folder(tmp_path, "parrot"))
+    same = source_folder(tmp_path, "parrot", keywords={"en": ["hello"]})
+    assert "'hello' (en) is what one says for hello" in desk.refuses("publish", same)
     assert "raise its version" in desk.refuses("publish", source_folder(tmp_path, version="0.9.0"))
     assert "there is no such publisher" in desk.refuses("publish", source_folder(tmp_path, "a"), "--publisher", "nobody")
     assert "no package.json" in desk.refuses("publish", tmp_path / "cloud")

@@ -109,6 +109,7 @@ def test_lines_of_another_version_of_the_platform_do_not_count(
 def test_a_manifest_that_the_index_cannot_hold_keeps_nobody_from_starting(
     folder: Path, monkeypatch: pytest.MonkeyPatch, inspected: list[str]
 ) -> None:
+    assert names(folder) == NAMES
     source = source_folder(folder, "huge", parameters={"most": 2**64})
     with pytest.raises(Invalid, match="more than 64 bits"):
         build(source)

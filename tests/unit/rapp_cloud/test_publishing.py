@@ -40,6 +40,13 @@ def test_words_that_another_has(words: dict[str, str]) -> None:
         check_publication(rapp("mail", **words), [rapp("clock", keyword="time", sentence="what time is it?")])
 
 
+@pytest.mark.parametrize("words", [{"keyword": "Stop!"}, {"sentence": "stop"}, {"keyword": "arrête", "language": "fr"}])
+def test_words_that_the_robot_keeps_for_itself(words: dict[str, str]) -> None:
+    with pytest.raises(Refused, match=r"is what one says to stop the robot; choose other words"):
+        check_publication(rapp("mail", **words), [])
+    check_publication(rapp("mail", keyword="stop the music"), [])
+
+
 def test_other_languages_old_versions_and_its_own_words_do_not_count() -> None:
     clock = rapp("clock", keyword="time")
     check_publication(rapp("mail", keyword="time", language="de"), [clock])

@@ -2,6 +2,7 @@
 
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tuf.api.metadata import Metadata
@@ -26,8 +27,8 @@ def robot(shelf: Shelf, tmp_path: Path) -> TrustedStore:
     return TrustedStore(StoreFolder(tmp_path / "tuf"), "store:", shelf.root_file.read_bytes(), tmp_path / "trust")
 
 
-def package(folder: Path, name: str = "hello", version: str = "1.0.0", program: str = "pass\n") -> bytes:
-    return build(source_folder(folder / program.strip(), name, version, program))
+def package(folder: Path, name: str = "hello", version: str = "1.0.0", program: str = "pass\n", **rapp: Any) -> bytes:
+    return build(source_folder(folder / program.strip(), name, version, program, **rapp))
 
 
 def offered(robot: TrustedStore, name: str = "hello") -> list[str]:
@@ -85,6 +86,19 @@ def test_two_versions_stay_on_offer(shelf: Shelf, robot: TrustedStore, tmp_path:
     shelf.publish(package(tmp_path))
     shelf.publish(package(tmp_path, version="1.0.1"))
     assert offered(robot) == ["1.0.0", "1.0.1"]
+
+
+def test_words_of_another_and_older_versions_are_not_published(shelf: Shelf, robot: TrustedStore, tmp_path: Path) -> None:
+    shelf.publish(package(tmp_path, version="1.0.1"))
+    with pytest.raises(Refused, match="is what one says for hello"):
+        shelf.publish(package(tmp_path, "parrot", keywords={"en": ["hello"]}))
+    with pytest.raises(Refused, match=r"1\.0\.1 is on offer"):
+        shelf.publish(package(tmp_path))
+    with pytest.raises(Refused, match="to stop the robot"):
+        shelf.publish(package(tmp_path, "hello", "1.0.2", keywords={"en": ["stop"]}))
+    shelf.publish(package(tmp_path, version="1.1.0"))
+    shelf.publish(package(tmp_path / "again", version="1.0.1"))  # on offer unchanged, as at each start
+    assert offered(robot) == ["1.0.1", "1.1.0"]
 
 
 def test_a_wrong_package_is_not_published(shelf: Shelf, robot: TrustedStore) -> None:

@@ -10,7 +10,9 @@ from rapp_api import communication, fake_body, navigation, ros_actions, vision
 from rapp_api.core_agent import CoreAgent
 from rapp_api.ros_core_agent import RosCoreAgent
 from rapp_api.testing import FakeCoreAgent
+from rapp_core.control import words
 from rapp_core.services.table import CORE_SERVICES, CoreService
+from rapp_hop.hz import manifest
 from rapp_hop.hz.manifest import CORE_SERVICES as PERMITTED
 
 ROOT = Path(__file__).parents[3]
@@ -68,6 +70,10 @@ def test_a_name_is_that_of_its_type(row: CoreService) -> None:
 def test_a_package_can_be_permitted_what_is_offered_and_nothing_else() -> None:
     beside = {"rapp_cloud_call", "rapp_send_mail", "rapp_keep"}
     assert {row.name for row in CORE_SERVICES} | beside == PERMITTED
+
+
+def test_the_store_knows_the_robot_s_own_words() -> None:
+    assert manifest.STOP == words.STOP
 
 
 @rows

@@ -66,7 +66,7 @@ def _publish_here(options: argparse.Namespace, packages: list[tuple[Manifest, by
         return
     with noting(options, shelf):
         for manifest, package in packages:
-            shelf.publish(package, options.publisher, tuple(options.only), check_publication)
+            shelf.publish(package, options.publisher, tuple(options.only))
             _tell("on offer", manifest, package)
 
 

@@ -37,6 +37,12 @@ CORE_SERVICES = frozenset(
     )
 )
 
+# The core agent's own words (`rapp_core.control.words`), by language: no RApp ever hears them, so none can be asked for by them.
+STOP = {
+    "en": "stop", "pl": "stop", "fr": "arrête", "de": "stopp", "es": "para", "it": "basta", "el": "σταμάτα", "pt": "para",
+    "nl": "stop", "sv": "stopp", "da": "stop", "fi": "seis", "cs": "stop", "ru": "стой", "tr": "dur",
+}  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Permissions:
