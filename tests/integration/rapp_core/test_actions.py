@@ -59,6 +59,23 @@ tell([posture.get_state(), posture.get_result().message])
     assert answers[5:] == [True, [3, ""]]
 
 
+def test_a_goal_of_no_use_ends_nothing(half):
+    answers = half.client("""
+walk, other = (navigation.action_client("rapp_move_to") for _ in range(2))
+for client in (walk, other):
+    tell(client.wait_for_server(rospy.Duration(10)))
+walking = threading.Event()
+walk.send_goal(MoveToGoal(x=0.2), feedback_cb=lambda feedback: feedback.x > 0.03 and walking.set())
+tell(walking.wait(20))
+other.send_goal(MoveToGoal(x=float("nan")))
+tell(other.wait_for_result(rospy.Duration(5)))
+tell([other.get_state(), other.get_result().error])
+tell(walk.wait_for_result(rospy.Duration(30)))
+tell([walk.get_state(), walk.get_result().message])
+""").rest()
+    assert answers == [True, True, True, True, [4, "invalid"], True, [3, ""]]
+
+
 def test_a_goal_and_a_cancel_of_a_stranger_are_not_heeded(half):
     client = half.client(WALK)
     half.until_walking()

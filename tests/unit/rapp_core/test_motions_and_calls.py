@@ -9,7 +9,7 @@ import pytest
 from fakes.bench import Bench
 from fakes.walking import CONFIG, walk
 from rapp_core.body_ports import Pose2D
-from rapp_core.errors import CoreError, Refused, Unreachable
+from rapp_core.errors import CoreError, Invalid, Refused, Unreachable
 from rapp_core.services.calls import Call
 from rapp_core.services.place import Waypoint
 
@@ -102,6 +102,53 @@ def test_a_goal_ends_what_moves_the_same_limbs(bench: Bench, monkeypatch: pytest
         walk(bench)
     bench.goal("rapp_move_to", newer, x=0.1, y=0.0, theta=0.0)
     assert bench.fake.journal == ["moveTo 1.00 0.00 0.00", "cancel", "moveTo 0.10 0.00 0.00"]
+
+
+USELESS: dict[str, tuple[str, dict[str, Any]]] = {
+    "walk": ("rapp_move_to", {"x": math.nan, "y": 0.0, "theta": 0.0}),
+    "far walk": ("rapp_move_to", {"x": 11.0, "y": 0.0, "theta": 0.0}),
+    "velocity": ("rapp_move_vel", {"x": math.nan, "y": 0.0, "theta": 0.0}),
+    "fast": ("rapp_move_vel", {"x": 1.0, "y": 0.0, "theta": 0.0}),
+    "path": ("rapp_move_along_path", {"poses": []}),
+    "far path": ("rapp_move_along_path", {"poses": [Waypoint("odom", Pose2D(x, 0.0, 0.0)) for x in (1.0, 7.0, 1.0)]}),
+    "posture": ("rapp_take_predefined_posture", {"posture": "Headstand", "speed": 0.0}),
+    "joint": ("rapp_move_joint", {"joints": ["LKneePitch"], "angles": [9.0], "speed": 0.0}),
+    "look": ("rapp_look_at_point", {"x": math.nan, "y": 0.0, "z": 0.0}),
+    "rest": ("rapp_rest", {"posture": "Stand"}),
+}
+
+
+@pytest.mark.parametrize("as_goal", [False, True])
+@pytest.mark.parametrize("name", USELESS)
+def test_a_request_of_no_use_ends_no_motion(bench: Bench, name: str, as_goal: bool) -> None:
+    service, request = USELESS[name]
+
+    def ask() -> None:
+        with pytest.raises((Invalid, Refused)):
+            bench.goal(service, Call(), **request) if as_goal else bench.call(service, **request)
+
+    bench.call("rapp_move_vel", x=0.1, y=0.0, theta=0.0)
+    bench.clock.at(2.0, ask)
+    bench.clock.at(4.0, bench.cut.set)
+    bench.go_on()
+    assert bench.fake.journal == ["move 0.1 0 0", "cancel"]
+    assert bench.clock.time >= 4.0
+
+
+def test_a_goal_of_use_ends_the_older_of_its_action_and_one_of_no_use_does_not(bench: Bench) -> None:
+    first = Call()
+    with pytest.raises(Invalid):
+        bench.goal("rapp_move_to", Call(older=[first]), x=math.nan, y=0.0, theta=0.0)
+    assert not first.ended
+    bench.goal("rapp_move_to", Call(older=[first]), x=0.1, y=0.0, theta=0.0)
+    assert first.ended
+    bench.clock.after(0.5, lambda: ask_too_late(bench, first))
+    bench.goal("rapp_move_to", Call(), x=0.1, y=0.0, theta=0.0)
+
+
+def ask_too_late(bench: Bench, ended: Call) -> None:
+    with pytest.raises(Refused, match="taken over"):
+        bench.goal("rapp_move_to", ended, x=0.1, y=0.0, theta=0.0)
 
 
 def test_a_goal_is_told_how_far_it_is(bench: Bench) -> None:

@@ -88,10 +88,8 @@ class _Action(ActionServer):  # type: ignore[misc]  # actionlib carries no types
             handle.set_rejected(fail(name, self.ActionResultType(), error), str(error))
             return
         handle.set_accepted()
-        for older in list(self._calls.values()):
-            older.end(TAKEN_OVER)
         feedback = self.ActionFeedback().feedback
-        call = Call(lambda values: handle.publish_feedback(fill(type(feedback)(), values)))
+        call = Call(lambda values: handle.publish_feedback(fill(type(feedback)(), values)), tuple(self._calls.values()))
         self._calls[handle.get_goal_id().id] = call
         threading.Thread(target=self._execute, args=(handle, grant, call), name=name, daemon=True).start()
 

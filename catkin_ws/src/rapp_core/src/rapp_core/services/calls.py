@@ -14,9 +14,10 @@ LIMBS = frozenset({"legs", "arms", "head"})
 class Call:
     """One call of a service."""
 
-    def __init__(self, feedback: Callable[[Mapping[str, Any]], None] | None = None) -> None:
-        """`feedback` is told how far the call is, from the thread that executes it."""
+    def __init__(self, feedback: Callable[[Mapping[str, Any]], None] | None = None, older: Sequence["Call"] = ()) -> None:
+        """`feedback` is told how far the call is, from the thread that executes it; `older` are ended once it is found of use."""
         self.feedback = feedback
+        self._older = older
         self.yields = False
         """Whether it gives way to the next call that wants one of its limbs."""
         self.puts_back = False
@@ -27,6 +28,12 @@ class Call:
         """End the call, which its caller is told as refused for this reason; the first one counts."""
         if self._reason is None:
             self._reason = reason
+
+    def take_over(self, reason: str) -> None:
+        """End the older calls that this one was made in place of."""
+        older, self._older = self._older, ()
+        for call in older:
+            call.end(reason)
 
     @property
     def ended(self) -> bool:

@@ -11,24 +11,28 @@ from rapp_core.services.reflexes import lasting
 POSTURE = "StandInit"
 
 
+def check(context: Context, share: Subsystem) -> None:
+    """Whether a request is of use, wherever the robot is. Raises Invalid, Refused."""
+    velocity, config = _velocity(share), context.config
+    if not finite(velocity.x, velocity.y, velocity.theta):
+        raise Invalid("cannot walk so: x, y and theta must be numbers; m/s and rad/s")
+    for name, value, most, unit in (
+        ("x", velocity.x, config.walk_speed, "m/s"),
+        ("y", velocity.y, config.side_speed, "m/s"),
+        ("theta", velocity.theta, config.turn_speed, "rad/s"),
+    ):
+        if abs(value) > most * (1 + 1e-6):  # the request's numbers are of single precision
+            raise Refused(f"cannot walk with {name} {value:g} {unit}: -{most:g} to {most:g} are allowed")
+
+
 def machine(context: Context) -> Machine:
     """Sub-FSM: check; what follows is `drive_machine`."""
 
-    def check(share: Subsystem) -> None:
-        velocity = _velocity(share)
-        if not finite(velocity.x, velocity.y, velocity.theta):
-            raise Invalid("cannot walk so: x, y and theta must be numbers; m/s and rad/s")
-        config = context.config
-        for name, value, most, unit in (
-            ("x", velocity.x, config.walk_speed, "m/s"),
-            ("y", velocity.y, config.side_speed, "m/s"),
-            ("theta", velocity.theta, config.turn_speed, "rad/s"),
-        ):
-            if abs(value) > most * (1 + 1e-6):  # the request's numbers are of single precision
-                raise Refused(f"cannot walk with {name} {value:g} {unit}: -{most:g} to {most:g} are allowed")
-        refuse_hazard(context, lasting(velocity))
+    def look(share: Subsystem) -> None:
+        check(context, share)
+        refuse_hazard(context, lasting(_velocity(share)))
 
-    return Machine("rapp_move_vel", {"check": Behaviour("check", check, label="check")}, "check", [], ["check"])
+    return Machine("rapp_move_vel", {"check": Behaviour("check", look, label="check")}, "check", [], ["check"])
 
 
 def drive_machine(context: Context) -> Machine:

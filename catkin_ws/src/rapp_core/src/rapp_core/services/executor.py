@@ -96,6 +96,9 @@ class Executor:
 
     def _execute(self, name: str, request: dict[str, Any], context: Context, preempt: bool) -> Reply:
         service, share = self._services[name], subsystem(name, **request)
+        if service.check is not None:
+            service.check(context, share)
+        context.call.take_over(TAKEN_OVER)
         if self._changes(service, share, context):
             return Reply()
         needed = sorted(service.resources if service.needs is None else service.needs(request))
@@ -114,10 +117,10 @@ class Executor:
     def _take(self, service: CoreService, resource: str, context: Context, preempt: bool) -> None:
         """Wait for a resource as long as the call is not ended; what goes on after its reply makes way."""
         for _ in range(max(1, round(PATIENCE / STEP))):
+            context.check()
             context.calls.make_way(context.call, resource, preempt, TAKEN_OVER)
             if self._resources[resource].acquire(timeout=min(STEP, PATIENCE)):
                 return
-            context.check()
         raise Refused(f"cannot run {service.name}: the {resource} is in use; wait for the other call")
 
     def _changes(self, service: CoreService, share: Subsystem, context: Context) -> bool:

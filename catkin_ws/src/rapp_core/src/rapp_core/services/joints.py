@@ -1,6 +1,7 @@
 """rapp_move_joint and rapp_look_at_point: moveJoint and lookAtPoint of the deliverable (section 4.5.2)."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from rapp_agent import Behaviour, Edge, Machine, Subsystem
@@ -32,18 +33,18 @@ def share_of_speed(speed: float, default: float) -> float:
     return speed or default
 
 
+def check(context: Context, share: Subsystem) -> None:
+    """Whether a request of rapp_move_joint is of use; notes the angles and the speed. Raises Invalid, Unreachable."""
+    joints, angles = list(request(share, "joints")), list(map(float, request(share, "angles")))
+    if not joints or len(joints) != len(angles) or len(set(joints)) != len(joints):
+        raise Invalid("cannot move joints: name each joint once, and give one angle (rad) for each")
+    share.memory["angles"] = dict(zip(joints, (_angle(context, *pair) for pair in zip(joints, angles, strict=True)), strict=True))
+    share.memory["speed"] = share_of_speed(float(request(share, "speed")), context.config.joint_speed)
+
+
 def machine(context: Context) -> Machine:
     """Sub-FSM: check, move."""
     robot = context.robot.motion
-
-    def check(share: Subsystem) -> None:
-        joints, angles = list(request(share, "joints")), list(map(float, request(share, "angles")))
-        if not joints or len(joints) != len(angles) or len(set(joints)) != len(joints):
-            raise Invalid("cannot move joints: name each joint once, and give one angle (rad) for each")
-        share.memory["angles"] = dict(
-            zip(joints, (_angle(context, *pair) for pair in zip(joints, angles, strict=True)), strict=True)
-        )
-        share.memory["speed"] = share_of_speed(float(request(share, "speed")), context.config.joint_speed)
 
     def move(share: Subsystem) -> Movement:
         angles: Any = share.memory["angles"]
@@ -56,7 +57,7 @@ def machine(context: Context) -> Machine:
     return Machine(
         "rapp_move_joint",
         {
-            "check": Behaviour("check", check, label="check"),
+            "check": Behaviour("check", partial(check, context), label="check"),
             "move": motion(context, "move", move, "angleInterpolationWithSpeed", feedback=now),
         },
         "check",
@@ -75,13 +76,15 @@ def _angle(context: Context, joint: str, angle: float) -> float:
     return min(max(angle, lower), upper)
 
 
+def check_look(_context: Context, share: Subsystem) -> None:
+    """Whether a request of rapp_look_at_point is of use, wherever the neck is. Raises Invalid."""
+    point = _point(share)
+    if not finite(*point) or max(map(abs, point)) > FARTHEST:
+        raise Invalid(f"cannot look there: x, y and z must be numbers, at most {FARTHEST:g} m")
+
+
 def look_machine(context: Context) -> Machine:
     """Sub-FSM: check, turn the head."""
-
-    def check(share: Subsystem) -> None:
-        point = _point(share)
-        if not finite(*point) or max(map(abs, point)) > FARTHEST:
-            raise Invalid(f"cannot look there: x, y and z must be numbers, at most {FARTHEST:g} m")
 
     def look(share: Subsystem) -> Movement:
         context.trace.call("core", "ALMotion", "angleInterpolationWithSpeed")
@@ -90,7 +93,7 @@ def look_machine(context: Context) -> Machine:
     return Machine(
         "rapp_look_at_point",
         {
-            "check": Behaviour("check", check, label="check"),
+            "check": Behaviour("check", partial(check_look, context), label="check"),
             "look": motion(context, "look", look, "angleInterpolationWithSpeed"),
         },
         "check",

@@ -1,6 +1,7 @@
 """rapp_take_predefined_posture and rapp_rest: takePredefinedPosture and rest of the deliverable (section 4.5.2)."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from rapp_agent import Behaviour, Edge, Machine, Subsystem
@@ -13,15 +14,17 @@ from rapp_core.services.moving import POSTURE, motion
 RESTING = ("Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
 
 
+def check(context: Context, share: Subsystem) -> None:
+    """Whether a request of rapp_take_predefined_posture is of use; notes the speed. Raises Invalid, Unreachable."""
+    known = context.robot.motion.postures()
+    if request(share, "posture") not in known:
+        raise Invalid(f"cannot take posture {request(share, 'posture')!r}: known are {', '.join(known)}")
+    share.memory["speed"] = share_of_speed(float(request(share, "speed")), context.config.posture_speed)
+
+
 def machine(context: Context) -> Machine:
     """Sub-FSM: check, take the posture."""
     robot = context.robot.motion
-
-    def check(share: Subsystem) -> None:
-        known = robot.postures()
-        if request(share, "posture") not in known:
-            raise Invalid(f"cannot take posture {request(share, 'posture')!r}: known are {', '.join(known)}")
-        share.memory["speed"] = share_of_speed(float(request(share, "speed")), context.config.posture_speed)
 
     def take(share: Subsystem) -> Movement:
         context.trace.call("core", POSTURE, "goToPosture")
@@ -33,7 +36,7 @@ def machine(context: Context) -> Machine:
     return Machine(
         "rapp_take_predefined_posture",
         {
-            "check": Behaviour("check", check, label="check"),
+            "check": Behaviour("check", partial(check, context), label="check"),
             "take": motion(context, "take", take, "goToPosture", POSTURE, feedback=now),
         },
         "check",
@@ -51,12 +54,14 @@ def comes_back(context: Context, before: str) -> bool:
     return before in RESTING and before != robot.motion.nearest_posture() and not robot.feeling.senses().fallen
 
 
+def check_rest(_context: Context, share: Subsystem) -> None:
+    """Whether a request of rapp_rest is of use. Raises Invalid."""
+    if (request(share, "posture") or RESTING[0]) not in RESTING:
+        raise Invalid(f"cannot rest in posture {request(share, 'posture')!r}: known are {', '.join(RESTING)}")
+
+
 def rest_machine(context: Context) -> Machine:
     """Sub-FSM: check, take the resting posture, switch the motors off."""
-
-    def check(share: Subsystem) -> None:
-        if (request(share, "posture") or RESTING[0]) not in RESTING:
-            raise Invalid(f"cannot rest in posture {request(share, 'posture')!r}: known are {', '.join(RESTING)}")
 
     def take(share: Subsystem) -> Movement:
         context.trace.call("core", POSTURE, "goToPosture")
@@ -69,7 +74,7 @@ def rest_machine(context: Context) -> Machine:
     return Machine(
         "rapp_rest",
         {
-            "check": Behaviour("check", check, label="check"),
+            "check": Behaviour("check", partial(check_rest, context), label="check"),
             "take": motion(context, "take", take, "goToPosture", POSTURE),
             "relax": motion(context, "relax", relax, "stiffnessInterpolation"),
         },

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from rapp_agent import Behaviour, Edge, Machine, Subsystem
@@ -36,10 +36,7 @@ class _Walk:
         context, start = self._context, self._motion.pose()
         self._start = self._pose = start
         self._goals = [context.place.in_odom(waypoint, start) for waypoint in waypoints]
-        length = sum(math.dist((a.x, a.y), (b.x, b.y)) for a, b in itertools.pairwise([start, *self._goals]))
-        if length > context.config.walk_distance:
-            most = f"{context.config.walk_distance:g} m at a time are allowed; walk in parts"
-            raise Refused(f"cannot walk {length:.1f} m: {most}")
+        _refuse_far(context, itertools.pairwise([start, *self._goals]))
         self._goal = self._goals[0]
         way = self.left()
         self._way = ON_THE_SPOT if turns and self._askew(way) else way
@@ -130,21 +127,36 @@ def _tells(left: Pose2D) -> bool:
     return math.hypot(left.x, left.y) > NEARLY
 
 
+def _refuse_far(context: Context, legs: Iterable[tuple[Pose2D, Pose2D]]) -> None:
+    length = sum(math.dist((a.x, a.y), (b.x, b.y)) for a, b in legs)
+    if length > context.config.walk_distance:
+        most = f"{context.config.walk_distance:g} m at a time are allowed; walk in parts"
+        raise Refused(f"cannot walk {length:.1f} m: {most}")
+
+
+def check(context: Context, share: Subsystem) -> None:
+    """Whether a request of rapp_move_to is of use, wherever the robot is. Raises Invalid, Refused."""
+    x, y, theta = (float(request(share, name)) for name in ("x", "y", "theta"))
+    if not finite(x, y, theta):
+        raise Invalid("cannot walk there: x, y and theta must be numbers; m and rad")
+    # The way round is the same pose: NAOqi would turn on the spot for a theta of many turns.
+    goal = share.memory["goal"] = Pose2D(x, y, turned(theta))
+    _refuse_far(context, [(ON_THE_SPOT, goal)])
+
+
 def machine(context: Context) -> Machine:
     """Sub-FSM: check, stand up if need be, walk, judge."""
     do = _Walk(context)
 
-    def check(share: Subsystem) -> None:
-        x, y, theta = (float(request(share, name)) for name in ("x", "y", "theta"))
-        if not finite(x, y, theta):
-            raise Invalid("cannot walk there: x, y and theta must be numbers; m and rad")
-        # The way round is the same pose: NAOqi would turn on the spot for a theta of many turns.
-        do.plan([Waypoint("base_link", Pose2D(x, y, turned(theta)))], turns=False)
+    def plan(share: Subsystem) -> None:
+        check(context, share)
+        goal: Any = share.memory["goal"]
+        do.plan([Waypoint("base_link", goal)], turns=False)
 
     return Machine(
         "rapp_move_to",
         {
-            "check": Behaviour("check", check, label="check"),
+            "check": Behaviour("check", plan, label="check"),
             "stand": standing_up(context),
             "walk": motion(context, "walk", do.walk, "moveTo", watch=do.watch, feedback=do.from_start, explain=do.explain),
             "arrived": Behaviour("arrived", do.arrive, label="judge"),
@@ -155,25 +167,32 @@ def machine(context: Context) -> Machine:
     )
 
 
+def check_path(context: Context, share: Subsystem) -> None:
+    """Whether a request of rapp_move_along_path is of use, wherever the robot is. Raises Invalid, Refused."""
+    poses: Sequence[Waypoint] = request(share, "poses")
+    if not 1 <= len(poses) <= MOST:
+        raise Invalid(f"cannot walk along {len(poses)} poses: 1 to {MOST} are possible")
+    for number, waypoint in enumerate(poses, 1):
+        if waypoint.frame not in FRAMES:
+            raise Invalid(f"cannot use pose {number} in frame {waypoint.frame!r}: known are {', '.join(FRAMES)}")
+        if not finite(waypoint.pose.x, waypoint.pose.y, waypoint.pose.theta):
+            raise Invalid(f"cannot use pose {number}: its position and orientation must be numbers")
+    legs = itertools.pairwise([Waypoint("base_link", ON_THE_SPOT), *poses])
+    _refuse_far(context, [(a.pose, b.pose) for a, b in legs if a.frame == b.frame])
+
+
 def path_machine(context: Context) -> Machine:
     """Sub-FSM: check, stand up if need be, then for each pose: turn towards it if need be, walk, judge."""
     do = _Walk(context)
 
-    def check(share: Subsystem) -> None:
-        poses: Sequence[Waypoint] = request(share, "poses")
-        if not 1 <= len(poses) <= MOST:
-            raise Invalid(f"cannot walk along {len(poses)} poses: 1 to {MOST} are possible")
-        for number, waypoint in enumerate(poses, 1):
-            if waypoint.frame not in FRAMES:
-                raise Invalid(f"cannot use pose {number} in frame {waypoint.frame!r}: known are {', '.join(FRAMES)}")
-            if not finite(waypoint.pose.x, waypoint.pose.y, waypoint.pose.theta):
-                raise Invalid(f"cannot use pose {number}: its position and orientation must be numbers")
-        do.plan(poses, turns=True)
+    def plan(share: Subsystem) -> None:
+        check_path(context, share)
+        do.plan(request(share, "poses"), turns=True)
 
     return Machine(
         "rapp_move_along_path",
         {
-            "check": Behaviour("check", check, label="check"),
+            "check": Behaviour("check", plan, label="check"),
             "stand": standing_up(context),
             "next": Behaviour("next", do.next, label="next pose"),
             "turn": motion(context, "turn", do.turn, "moveTo", watch=do.watch, feedback=do.on_path, explain=do.explain),
