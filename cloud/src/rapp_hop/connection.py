@@ -152,7 +152,7 @@ class Message(HTTPMessageDelegate):
         answer = self._answer
         try:
             if answer is None and self._job is not None:
-                answer = await self._job.run(await self._body.whole() if self._body is not None else b"")
+                answer = await self._answer_of(self._job)
             if answer is not None and not self.stream.closed():
                 without_body = self._head is not None and self._head.method == "HEAD"
                 await send(self.stream, answer, self._keep, without_body, self._version, self._site.send_timeout)
@@ -169,6 +169,13 @@ class Message(HTTPMessageDelegate):
             if self._job is not None:
                 await self._job.done()
             self._site.running(self, False)
+
+    async def _answer_of(self, job: Job) -> WireAnswer:
+        try:
+            body = await self._body.whole() if self._body is not None else b""
+        except HopError as error:
+            return job.failed(error)
+        return await job.run(body)
 
     def _end(self) -> None:
         if self._body is not None:

@@ -39,7 +39,7 @@ from rapp_hop.repeats import Repeats
 from rapp_hop.runner import Runner
 from rapp_hop.sending import head_of
 from rapp_hop.service import BASE, Authenticate
-from rapp_hop.spool import Spool
+from rapp_hop.spool import Room, Spool
 from rapp_hop.streams import PatientStream, PatientTlsStream
 
 _log = logging.getLogger(__name__)
@@ -56,6 +56,7 @@ class ServerLimits:
     send_timeout: float = 60.0  # seconds in which a peer takes nothing of an answer
     connections: int = 1000  # at once
     connections_of_one: int = 300  # of one address
+    spooled: int = 2**30  # bytes of all bodies together, in memory and on the disk
     rate: float = 1000.0  # calls per second of one caller
     burst: float = 2000.0  # calls of one caller at once
     log_lines: int = 50  # per second
@@ -88,6 +89,7 @@ class HopServer:
         self._own_runner = runner is None
         self.repeats = Repeats(time.monotonic)
         self.uploads = uploads
+        self._room = Room(self.limits.spooled)
         self.brake = Brake(self.limits.log_lines, time.monotonic)
         self.header_bytes = self.limits.headers
         self.header_timeout = self.limits.header_timeout
@@ -209,7 +211,7 @@ class HopServer:
 
     def spool(self) -> Spool:
         """Return a place for a body."""
-        return Spool(self.uploads)
+        return Spool(self.uploads, self._room)
 
     def malformed(self, error: HopError) -> WireAnswer:
         """Return the answer for what is no request."""

@@ -6,17 +6,29 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import IO
 
-from rapp_hop.protocol import Body
+from rapp_hop.errors import HopError, Unreachable
+from rapp_hop.protocol import TURNED_AWAY, Body
 
 IN_MEMORY = 256 * 1024  # bytes
 
 
-class Spool:
-    """Collects one body; `whole()` returns it. Disk work is done in threads."""
+class Room:
+    """What the bodies of one server may take together, in memory and on the disk."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, size: int) -> None:
+        """:param size: bytes"""
+        self.left = size
+
+
+class Spool:
+    """Collects one body; `whole()` returns it. Disk work is done in threads. What finds no room is taken and dropped."""
+
+    def __init__(self, folder: Path, room: Room) -> None:
         self.length = 0
         self._folder = folder
+        self._room = room
+        self._held = 0  # bytes of the room
+        self._problem: HopError | None = None
         self._buffer = bytearray()
         self._file: IO[bytes] | None = None
         self._writing: asyncio.Future[None] | None = None
@@ -24,6 +36,12 @@ class Spool:
     def add(self, piece: bytes) -> None:
         """Take one piece."""
         self.length += len(piece)
+        if self._problem is None and len(piece) > self._room.left:
+            self._give_up("cannot take this request now: the server holds too many long ones, try again later")
+        if self._problem is not None:
+            return
+        self._room.left -= len(piece)
+        self._held += len(piece)
         self._buffer += piece
 
     def overflow(self) -> asyncio.Future[None] | None:
@@ -37,19 +55,29 @@ class Spool:
     async def whole(self) -> Body:
         """Return the body.
 
+        :raises Unreachable: when there was no room for it
         :raises OSError: when the disk took it not
         """
         if self._writing is not None:
             await self._writing
+        if self._problem is not None:
+            raise self._problem
         if self._file is None:
             return bytes(self._buffer)
         return await asyncio.to_thread(self._mapped)
 
     def drop(self) -> None:
         """Let go of all."""
+        self._room.left += self._held
+        self._held = 0
         self._buffer = bytearray()
         if self._file is not None and (self._writing is None or self._writing.done()):
             self._file.close()
+
+    def _give_up(self, why: str) -> None:
+        self._problem = Unreachable(why, 503)
+        self._problem.reason = TURNED_AWAY
+        self.drop()
 
     def _write(self, data: bytearray) -> None:
         if self._file is None:

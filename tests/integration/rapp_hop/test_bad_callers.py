@@ -93,6 +93,25 @@ def test_h15_too_many_connections_are_told_so(tmp_path: Path) -> None:
     visit(test, tmp_path, limits=ServerLimits(connections_of_one=5))
 
 
+def test_h15_bodies_have_bounded_room_together(tmp_path: Path) -> None:
+    """Who finds none is turned away and may come again; who goes gives back what he took."""
+
+    async def test(house: House) -> None:
+        body = b'{"value": "' + b"x" * 600_000 + b'"}'
+        with socket.create_connection(("127.0.0.1", house.port), 10) as hoarder:
+            hoarder.sendall(request(body=body)[:-2])
+            async with asyncio.timeout(20):
+                while (answer := await house.ask(request(body=body))).status == 200:
+                    await asyncio.sleep(0.01)  # until what the hoarder sent has been read
+            assert answer.status == 503 and answer.headers["retry-after"]
+            assert answer.json["error"]["kind"] == "unreachable"
+        async with asyncio.timeout(20):
+            while (await house.ask(request(body=body))).status != 200:
+                await asyncio.sleep(0.01)
+
+    visit(test, tmp_path, limits=ServerLimits(spooled=2**20))
+
+
 def test_h16_callers_who_hang_up_in_the_middle_of_the_answer(tmp_path: Path) -> None:
     closed = asyncio.Event()
 

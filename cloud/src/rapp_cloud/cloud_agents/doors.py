@@ -8,15 +8,18 @@ import os
 import secrets
 from pathlib import Path
 
-from rapp_hop.errors import Refused
+from rapp_hop.client import CLIENTS
+from rapp_hop.errors import Refused, Unreachable
 from rapp_hop.mounts import Mount, Visit
-from rapp_hop.protocol import WireAnswer
+from rapp_hop.protocol import TURNED_AWAY, WireAnswer
 from rapp_hop.registry import ServiceRegistry
 from rapp_hop.relay import relay
-from rapp_hop.server import HopServer
+from rapp_hop.server import HopServer, ServerLimits
 from rapp_hop.service import Authenticate
 
 MAX_CALL = 32 * 2**20  # bytes of a call with its files
+CALLS = 16  # of one agent at once
+LIMITS = ServerLimits(connections=CLIENTS, spooled=2 * MAX_CALL)  # of one door: what an agent fills is its own
 LONGEST_CALL = 600.0  # s; a service's own time is shorter
 SOCKET = "platform.socket"
 EVERYBODY = 0o666  # may connect: the socket is bound into one sandbox only, whose account differs from ours
@@ -30,8 +33,9 @@ class Door:
         self._house = house
         self._secret = secret
         self._services = services
+        self._calls = 0
         mount = Mount("/hop/", self._pass, max_body=MAX_CALL)
-        self._server = HopServer(ServiceRegistry([]), lambda _token: "cloud agent", house.uploads, [mount])
+        self._server = HopServer(ServiceRegistry([]), lambda _token: "cloud agent", house.uploads, [mount], LIMITS)
         self._server.listen_unix(path, EVERYBODY)
 
     async def close(self) -> None:
@@ -42,7 +46,15 @@ class Door:
     async def _pass(self, visit: Visit) -> WireAnswer:
         if visit.rest not in self._services:
             raise Refused(f"cannot call {visit.rest[:70]!r}: the package does not name it under permissions.cloud", 403)
-        return await relay(self._house.platform, visit.request, visit.request.path, LONGEST_CALL, self._secret)
+        if self._calls >= CALLS:
+            error = Unreachable(f"cannot call {visit.rest} now: {CALLS} calls of this cloud agent are open, try again later", 503)
+            error.reason = TURNED_AWAY
+            raise error
+        self._calls += 1
+        try:
+            return await relay(self._house.platform, visit.request, visit.request.path, LONGEST_CALL, self._secret)
+        finally:
+            self._calls -= 1
 
 
 class Doors:
