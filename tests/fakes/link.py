@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from rapp_core.errors import CoreError, Refused, Unreachable
+from rapp_core.ports import Undelivered
 
 
 class FakeLink:
@@ -21,6 +22,7 @@ class FakeLink:
         self.answers: dict[str, Any] = {}
         self.asked: list[tuple[str, dict[str, Any]]] = []
         self.kept: list[str] = []
+        self.undelivered: Undelivered | None = None
 
     @property
     def present(self) -> bool:

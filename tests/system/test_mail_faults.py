@@ -19,6 +19,7 @@ SENT = "I have finished, your message to Elizabeth is sent"
 KEPT = "I cannot reach the mail server, I keep your message and send it later"
 LOCKED = "the mail server does not let me in, I keep your message and send it when it does"
 REFUSED = "the mail server refuses your message to Elizabeth, I cannot send it"
+NOT_TAKEN = "The mail server does not take your message to elizabeth@home.example, I could not send it, and keep it"
 PROFILE = {"name": "Maria", "language": "en", "contacts": [{"name": "Elizabeth", "address": "elizabeth@home.example"}]}
 
 
@@ -131,6 +132,21 @@ def test_a_recipient_who_is_refused_is_told_and_not_tried_again(robot: RobotBehi
     assert dictate(robot) == REFUSED
     assert kept(robot) == []
     assert delivered(robot) == []
+
+
+def test_kept_and_then_refused_it_is_told_at_the_next_chance_once_and_stays(robot: RobotBehindFaults) -> None:
+    since = len(robot.seen)
+    meet(robot, LATER, NO_RECIPIENT)
+    assert dictate(robot) == KEPT
+    said = robot.until(lambda seen: (seen.kind, seen.detail) == ("said", NOT_TAKEN), since)
+    assert said.state == "s3"
+    robot.kill("link")
+    robot.start("link")
+    assert dictate(robot) == REFUSED
+    assert [seen.detail for seen in robot.seen[since:] if seen.kind == "said"].count(NOT_TAKEN) == 1
+    (content,) = (robot.home / "link" / "outbox").glob("*/message.eml")
+    assert message_id(content.read_bytes())
+    content.unlink()
 
 
 def test_the_link_killed_while_it_sends_is_asked_again_and_the_mail_comes_once(robot: RobotBehindFaults) -> None:

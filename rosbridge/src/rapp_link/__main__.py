@@ -45,7 +45,7 @@ class Link:
         self.boot = uuid.uuid4().hex
         self.client = TellingClient(config.cloud, config.token or None, self._tell, config.cloud_ca_file)
         reports = Reports(own / "reports")
-        outbox = Outbox(own / "outbox", config.mail.waiting)
+        self.outbox = outbox = Outbox(own / "outbox", config.mail.waiting)
         self.platform = Platform(self.client, config, reports)
         self.postman = Postman(outbox, TellingSender(SmtpSender(config.mail), self._tell), config.mail)
         limits = DeliveryLimits(quota=config.quota)
@@ -64,7 +64,7 @@ class Link:
                 tasks = [group.create_task(self.platform.run()), group.create_task(self.agents.run())]
                 if self.config.mail.host:
                     tasks.append(group.create_task(self.postman.run()))
-                life = sign_of_life(self.ros.alive, self.platform, self.boot, self.config.alive)
+                life = sign_of_life(self.ros.alive, self.platform, self.outbox, self.boot, self.config.alive)
                 tasks.append(group.create_task(life))
                 print("READY " + json.dumps({"boot": self.boot, "bridge": self.config.bridge}), flush=True)
                 await stop.wait()

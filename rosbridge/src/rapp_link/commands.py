@@ -6,6 +6,7 @@ import logging
 import re
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any
 
 from rapp_hop import strict_json
@@ -22,6 +23,7 @@ from rapp_link.office import Command, Ticket
 from rapp_link.outbox import Outbox
 from rapp_link.postman import Postman
 from rapp_link.reports import Reports
+from rapp_link.telling import untold
 from rapp_link.threads import in_thread
 
 MARGIN = 0.5  # seconds before a job's deadline at which a mail not sent yet is told as kept
@@ -71,6 +73,7 @@ class Commands:
             "stop_cloud_agent": self.stop_cloud_agent,
             "call": self.call,
             "send_mail": self.send_mail,
+            "mail_told": self.mail_told,
             "report": self.report,
         }
 
@@ -99,6 +102,17 @@ class Commands:
         """{recording, language} → {rapp | null, confidence, text, candidates, choice}."""
         recording, language = take(arguments, recording=str, language=str)
         if not _LANGUAGE.fullmatch(language):
+    async def _drop_revoked(self, ticket: Ticket) -> list[str]:
+        if self._delivery is None:
+            return []
+        try:
+            with untold():
+                async with asyncio.timeout(max(0.0, ticket.remaining - MARGIN)):
+                    return sorted(await self._delivery.drop_revoked())
+        except (HopError, TimeoutError) as error:
+            _log.warning("cannot see which keys were revoked: %s", error or "the store is too slow")
+            return []
+
             raise Refused(f"cannot interpret the language {language[:20]!a}: give one such as en")
         path = await in_thread(shared_file, self._config.home, recording)
         return await self._platform.call("interpret", {"language": language}, ticket.remaining, recording=path)
@@ -171,8 +185,22 @@ class Commands:
 
     async def report(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
         """{run} → {kept}; it goes to the platform as soon as that can be reached. False: it has it already."""
+        if letter.untold:
+            await self._note_told(letter.message_id, late=False)
         (run,) = take(arguments, run=dict)
         if self._gone_back and run.get("run") == self._gone_back["run"]:
+    async def mail_told(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
+        """{message_id} → {told}: the person knows that a mail which was kept was refused (see `sign_of_life`)."""
+        (message_id,) = take(arguments, message_id=str)
+        await self._note_told(message_id, late=True)
+        return {"told": True}
+
+    async def _note_told(self, message_id: str, *, late: bool) -> None:
+        try:
+            await in_thread(partial(self._outbox.told, message_id, late=late))
+        except Refused as error:
+            _log.error("%s", error)
+
             run = {**run, **self._gone_back}
         kept = await in_thread(self._reports.keep, run)
         self._platform.hurry()
@@ -231,11 +259,13 @@ def _told(letter: Letter) -> dict[str, str]:
     return {"state": state, "message_id": letter.message_id}
 
 
-async def sign_of_life(publish: Any, platform: Platform, boot: str, every: float) -> None:
-    """Publish that the link lives, and whether the platform does, until cancelled.
+async def sign_of_life(publish: Any, platform: Platform, outbox: Outbox, boot: str, every: float) -> None:
+    """Publish that the link lives, whether the platform does, and a refused mail nobody was told of, until cancelled.
 
     :param every: seconds
     """
     while True:
-        publish({"boot": boot, "cloud": platform.reachable})
+        letter = outbox.untold()
+        undelivered = {"message_id": letter.message_id, "recipients": letter.untold} if letter else None
+        publish({"boot": boot, "cloud": platform.reachable, "undelivered": undelivered})
         await asyncio.sleep(every)

@@ -41,6 +41,8 @@ class Letter:
     refused: Mapping[str, str] = field(default_factory=dict)  # recipient: server's words
     tries: int = 0
     locked: bool = False  # at the last try, see `Outcome`
+    told: tuple[str, ...] = ()  # refused recipients of whom the answer to who asked for the mail has told
+    late: tuple[str, ...] = ()  # refused recipients of whom was told later, aloud
 
     @property
     def state(self) -> State:
@@ -48,6 +50,16 @@ class Letter:
         if self.pending:
             return "queued"
         return "refused" if set(self.refused) >= set(self.recipients) else "sent"
+
+    @property
+    def undelivered(self) -> tuple[str, ...]:
+        """Return the recipients refused after the mail had been kept: its content stays."""
+        return tuple(name for name in self.refused if name not in self.told)
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Return those of them of whom nobody has been told yet."""
+        return tuple(name for name in self.undelivered if name not in self.late)
 
     def after(self, outcome: Outcome) -> "Letter":
         """Return the letter after a try; a recipient the outcome does not name stays pending."""
@@ -70,6 +82,7 @@ def from_json(data: bytes) -> Letter:
     """
     try:
         fields: dict[str, Any] = json.loads(data)
+        refused = {str(name): str(words) for name, words in fields["refused"].items()}
         return Letter(
             message_id=str(fields["message_id"]),
             sender=str(fields["sender"]),
@@ -77,9 +90,11 @@ def from_json(data: bytes) -> Letter:
             digest=str(fields["digest"]),
             queued_at=float(fields["queued_at"]),
             pending=tuple(map(str, fields["pending"])),
-            refused={str(name): str(words) for name, words in fields["refused"].items()},
+            refused=refused,
             tries=int(fields["tries"]),
             locked=bool(fields.get("locked", False)),
+            told=tuple(map(str, fields.get("told", refused))),  # one written before this was noted has no content any more
+            late=tuple(map(str, fields.get("late", ()))),
         )
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise Invalid(f"cannot read a letter of the outbox: {error}") from None

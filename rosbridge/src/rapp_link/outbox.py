@@ -2,8 +2,9 @@
 
 a mail is in the outbox whole or not at all (its folder is made aside, then renamed); the same bytes and one Message-ID go
 out at every try; what the server took is written down before anybody is told; the content of a finished mail goes, its
-Message-ID stays, so that asking twice sends once. A power cut between the server's "taken" and our note means one more
-try with the same Message-ID, which a server that knows it drops.
+Message-ID stays, so that asking twice sends once; one refused or given up after it was kept keeps its content. A power
+cut between the server's "taken" and our note means one more try with the same Message-ID, which a server that knows it
+drops.
 
 Layout: <folder>/<hash of Message-ID>/{letter.json, message.eml}. Blocking; one thread at a time (a lock sees to it).
 """
@@ -14,6 +15,7 @@ import logging
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from rapp_hop.errors import Invalid, Refused
@@ -23,6 +25,7 @@ from rapp_link.message import Built
 
 _log = logging.getLogger(__name__)
 REMEMBERED = 1000  # finished mails whose Message-ID is known
+UNDELIVERED = 20  # of them whose content stays, as it was refused after the mail had been kept
 
 
 class Outbox:
@@ -87,11 +90,32 @@ class Outbox:
         :raises Refused: the disk refuses
         """
         with self._lock, _translated(self._folder):
-            self._letters[letter.message_id] = letter
-            replace_whole(self._disk, self._place(letter) / "letter.json", to_json(letter))
-            if letter.state != "queued":
+            self._note(letter)
+
+    def untold(self) -> Letter | None:
+        """Return the oldest mail refused after it was kept of which nobody has been told; does not wait for the disk."""
+        letters = [letter for letter in list(self._letters.values()) if letter.untold]  # list: whole in one step, so no lock
+        return min(letters, key=lambda letter: letter.queued_at, default=None)
+
+    def told(self, message_id: str, *, late: bool) -> None:
+        """Write down that a mail's refusal has been told; in memory it is known even when the disk refuses.
+
+        :param late: aloud, after the mail had been kept; otherwise to who asked for it, and its content goes
+        :raises Refused: the disk refuses
+        """
+        with self._lock, _translated(self._folder):
+            letter = self._letters.get(message_id)
+            if letter is not None and letter.untold:
+                told = letter.told + letter.untold
+                self._note(replace(letter, late=letter.undelivered) if late else replace(letter, told=told))
+
+    def _note(self, letter: Letter) -> None:
+        self._letters[letter.message_id] = letter
+        replace_whole(self._disk, self._place(letter) / "letter.json", to_json(letter))
+        if letter.state != "queued":
+            if not letter.undelivered:
                 self._disk.remove(self._place(letter) / "message.eml")
-                self._forget_oldest()
+            self._forget_oldest()
 
     def _store(self, letter: Letter, content: bytes) -> None:
         aside = new_aside(self._folder)
@@ -114,7 +138,7 @@ class Outbox:
                 _log.error("cannot use %s: %s, look at it and remove it", place, error)
                 continue
             self._letters[letter.message_id] = letter
-            if letter.state != "queued":
+            if letter.state != "queued" and not letter.undelivered:
                 self._disk.remove(place / "message.eml")
         self._forget_oldest()
 
@@ -123,6 +147,8 @@ class Outbox:
         for letter in done[: max(0, len(done) - REMEMBERED)]:
             self._disk.remove(self._place(letter))
             del self._letters[letter.message_id]
+        for letter in [item for item in done if item.undelivered][:-UNDELIVERED]:
+            self._disk.remove(self._place(letter) / "message.eml")
 
     def _place(self, letter: Letter) -> Path:
         return self._folder / hashlib.sha256(letter.message_id.encode()).hexdigest()[:40]

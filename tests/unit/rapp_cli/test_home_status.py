@@ -15,7 +15,7 @@ from rapp_cli.home.supervisor import Process
 from rapp_cli.timeline import Entry, append
 from rapp_core.config import Config
 from rapp_core.control.quarantine import Quarantine
-from rapp_link.letter import Letter, to_json
+from rapp_link.letter import Letter, Outcome, to_json
 
 NOW = 1_800_000_000.0
 
@@ -78,6 +78,19 @@ def test_waiting_mails_are_counted_and_finished_ones_are_not(home: Home) -> None
     (outbox / "broken").mkdir()
     (outbox / "broken" / "letter.json").write_text("{")
     assert status.read(home, {}).mails_waiting == 2
+
+
+def test_a_mail_refused_after_it_was_kept_is_shown_while_it_is_there(home: Home) -> None:
+    letter = Letter("<a>", "me@y", ("x@y", "z@y"), "", NOW, ("x@y", "z@y")).after(Outcome(("z@y",), {"x@y": "550 no such mailbox"}))
+    folder = home.robot / "link" / "outbox" / "a"
+    folder.mkdir(parents=True)
+    (folder / "letter.json").write_bytes(to_json(letter))
+    assert status.read(home, {}).mails_undelivered == {}
+    (folder / "message.eml").write_text("Subject: hello")
+    shown = status.text(home, status.read(home, {}), NOW)
+    assert "0 waiting" in shown
+    assert f"not sent    to x@y: 550 no such mailbox; the mail is {folder / 'message.eml'}" in shown
+    assert "z@y" not in shown
 
 
 @pytest.mark.usefixtures("silent")

@@ -23,9 +23,10 @@ from rapp_core.control.control import Control
 from rapp_core.control.fsm import core_machine
 from rapp_core.control.parts import Parts
 from rapp_core.control.platform import Platform
-from rapp_core.errors import Bug, Invalid, Refused, Unreachable
+from rapp_core.control.refusals import not_delivered
+from rapp_core.errors import Bug, CoreError, Invalid, Refused, Unreachable
 from rapp_core.launcher.lease import Lease
-from rapp_core.ports import Signal
+from rapp_core.ports import Signal, Undelivered
 from rapp_core.services.context import Context
 from rapp_core.services.executor import Executor
 from rapp_core.trace import Happening, Trace
@@ -129,6 +130,36 @@ def test_waits_for_a_robot_that_is_off(home: Home) -> None:
 
 
 # ways through
+# late news
+
+
+def test_a_mail_that_was_refused_after_it_was_kept_is_told_once_before_it_listens_on(home: Home) -> None:
+    home.start()
+    mail = Undelivered("<1@nao>", ("e@home.example",))
+    home.clock.at(home.clock.time + 1.0, lambda: setattr(home.link, "undelivered", mail))
+    told: list[float] = []
+    home.link.answers["mail_told"] = lambda _arguments: told.append(home.clock.time)
+    home.fake.person_says_at(home.clock.time + 20.0, "what time is it", seconds=1.0)
+    assert home.round() == KEYWORD
+    assert told[0] < home.config.listening_round, "it does not wait for the end of a quiet round"
+    assert ("mail_told", {"message_id": "<1@nao>"}) in home.link.asked
+    assert [(each.state, each.detail) for each in home.happenings if each.kind == "said"] == [
+        ("s3", not_delivered(mail.recipients))
+    ]
+
+
+def test_late_news_that_cannot_be_said_waits_and_the_link_hears_nothing_of_it(home: Home) -> None:
+    home.start()
+    home.link.undelivered = Undelivered("<1@nao>", ("e@home.example",))
+    home.fake.body.here = False
+    home.machine.step(home.share)
+    assert "mail_told" not in home.link.names()
+    home.fake.body.here = True
+    home.link.answers["mail_told"] = {"told": True}
+    home.step_until(lambda: "mail_told" in home.link.names())
+    assert home.fake.said()[-1] == not_delivered(("e@home.example",))
+
+
 
 
 def test_an_isolated_keyword_runs_its_rapp(home: Home) -> None:

@@ -46,6 +46,7 @@ class Status:
     installed: Mapping[str, str] = field(default_factory=dict)  # versions of the RApps on the robot
     cloud_agent: str | None = None  # name of its package, when the running RApp has one at the home's own platform
     quarantine: Mapping[str, Failing] = field(default_factory=dict)  # RApps that keep failing, and are not started for a while
+    mails_undelivered: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  # file: recipient: the server's words
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -75,7 +76,8 @@ def read(home: Home, processes: Mapping[str, Process]) -> Status:
     rapp, agent = (_rapp(folder) if running else None for folder in (home.robot / "runs", home.cloud / "agents" / "runs"))
     installed = {name: manifest.version.text for name, manifest in RappFolder(home.robot / "rapps").list().items()}
     failing = Quarantine(Config(home=home.robot)).present()
-    return Status(agents, core, rapp, registered, _waiting(home.robot), installed, agent, failing)
+    waiting, undelivered = _mails(home.robot)
+    return Status(agents, core, rapp, registered, waiting, installed, agent, failing, undelivered)
 
 
 def _frozen(process: Process) -> Process:
@@ -105,14 +107,19 @@ def _rapp(runs: Path) -> str | None:
     return None
 
 
-def _waiting(robot: Path) -> int:
-    count = 0
-    for path in (robot / "link" / "outbox").glob("*/letter.json"):
+def _mails(robot: Path) -> tuple[int, dict[str, dict[str, str]]]:
+    """How many wait, and those that were kept and then refused, as long as their content is there."""
+    waiting, undelivered = 0, {}
+    for path in sorted((robot / "link" / "outbox").glob("*/letter.json")):
         try:
-            count += from_json(path.read_bytes()).state == "queued"
+            letter = from_json(path.read_bytes())
         except (OSError, Invalid):
             continue  # it was sent meanwhile, or the link itself complains of it
-    return count
+        waiting += letter.state == "queued"
+        content = path.with_name("message.eml")
+        if letter.undelivered and content.exists():
+            undelivered[str(content)] = {name: letter.refused[name] for name in letter.undelivered}
+    return waiting, undelivered
 
 
 def text(home: Home, status: Status, now: float) -> str:
@@ -133,7 +140,11 @@ def text(home: Home, status: Status, now: float) -> str:
     for name, entry in status.quarantine.items():
         until = time.strftime("%H:%M:%S", time.localtime(entry.until))
         lines += [f"quarantine  {name} {entry.version} until {until}: has failed {entry.failures} times in a row ({entry.why})"]
-    return "\n".join([*lines, f"mails       {status.mails_waiting} waiting to be sent"])
+    lines += [f"mails       {status.mails_waiting} waiting to be sent"]
+    for path, refused in status.mails_undelivered.items():
+        words = "; ".join(f"{name}: {said}" for name, said in refused.items())
+        lines += [f"not sent    to {words}; the mail is {path}, remove it when it is not needed any more"]
+    return "\n".join(lines)
 
 
 def _when(moment: float, now: float) -> str:

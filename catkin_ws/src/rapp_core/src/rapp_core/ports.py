@@ -97,6 +97,14 @@ class Robot:
     present: Callable[[], bool]  # whether the robot is connected at this moment
 
 
+@dataclass(frozen=True)
+class Undelivered:
+    """A mail that was refused after it had been kept, and of which nobody has been told."""
+
+    message_id: str
+    recipients: tuple[str, ...]  # addresses
+
+
 class Hop(Protocol):
     """The link: all calls that leave the robot (rapp_hop/*)."""
 
@@ -112,6 +120,10 @@ class Hop(Protocol):
     @property
     def present(self) -> bool:
         """Whether the link is there at this moment."""
+
+    @property
+    def undelivered(self) -> Undelivered | None:
+        """A mail of which the person has to be told, and after it the link by `mail_told`."""
 
 
 class Signal(Protocol):

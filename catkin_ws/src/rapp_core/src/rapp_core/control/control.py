@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rapp_agent import Subsystem
 from rapp_core.control.dismantling import Dismantling
+from rapp_core.control.late_news import LateNews
 from rapp_core.control.listening import Listener
 from rapp_core.control.parts import Parts
 from rapp_core.control.quarantine import Quarantine
@@ -33,6 +34,7 @@ class Control:
         self._quarantine = Quarantine(parts.config)
         self._stopping = Stopping(parts.robot, parts.attention, parts.trace)
         self._dismantling = Dismantling(parts, self._stopping, self._trial, self._quarantine)
+        self._late_news = LateNews(parts.hop, self._say)
         self._run: Agent | None = None
 
     # s1, s2: initialise, register
@@ -59,12 +61,17 @@ class Control:
     # s3 to s6: from a command to a package
 
     def listen(self, share: Subsystem) -> None:
-        """One listening round."""
+        """One listening round; first, what the person has to be told of what went on after a run."""
         parts, known = self._parts, self._parts.platform.changes
         self._stopping.end()
+        self._late_news.tell()
         share.memory.update(keyword=None, command=None, choice=None, problem=None, rapp=None, error=None)
         keywords = {keyword: known.name for known in parts.platform.rapps().values() for keyword in known.keywords}
-        heard = self._listener.round(sorted(keywords), self._recording, parts.stop, lambda: parts.platform.changes != known)
+
+        def stale() -> bool:
+            return parts.platform.changes != known or self._late_news.waits
+
+        heard = self._listener.round(sorted(keywords), self._recording, parts.stop, stale)
         if isinstance(heard, Path):
             share.memory["command"] = heard
         elif heard is not None:

@@ -1,4 +1,6 @@
-"""Why something was not installed, not interpreted or not started, in words for the person. Pure."""
+"""Why something was not installed, not interpreted, not started or not delivered, in words for the person. Pure."""
+
+from collections.abc import Sequence
 
 from rapp_core.errors import NO_RUNTIME, CoreError, Unreachable
 
@@ -39,5 +41,10 @@ def not_started(error: CoreError) -> str:
 
 
 def not_activated(error: CoreError) -> str:
+def not_delivered(recipients: Sequence[str]) -> str:
+    """What to say of a mail that was kept, and that the mail server has then refused, or not taken for days."""
+    return f"The mail server does not take your message to {' and '.join(recipients)}, I could not send it, and keep it"
+
+
     """What to say of a RApp whose dynamic agent was not started."""
     return "I cannot start it, I lack what it is written in" if error.reason == NO_RUNTIME else "I cannot start it"

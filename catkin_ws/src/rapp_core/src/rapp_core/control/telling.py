@@ -5,7 +5,8 @@ from typing import Any
 
 from rapp_core.trace import Trace
 
-UNTOLD = frozenset({"list_rapps", "report"})  # asked every minute, whether something happens or not; said of a run that is over
+UNTOLD = frozenset({"list_rapps", "report", "mail_told"})
+"""Asked every minute, whether something happens or not; said of a run that is over."""
 SUBJECTS = {"install": "name", "remove": "name", "started": "name", "start_cloud_agent": "rapp", "call": "service"}
 """Argument that says what a request is about."""
 ANSWERS = {"interpret": "rapp", "send_mail": "state"}  # field that says how a request was answered

@@ -16,6 +16,7 @@ from std_msgs.msg import String
 
 from rapp_core.control.telling import Telling
 from rapp_core.errors import KINDS, Bug, CoreError, Refused, Unreachable
+from rapp_core.ports import Undelivered
 from rapp_core.trace import Trace
 
 SILENCE = 0.9  # s without a sign of life of the link after which it is gone
@@ -46,6 +47,7 @@ class RosHop:
         self._jobs: dict[str, queue.Queue[Any]] = {}
         self._alive = float("-inf")
         self._boot = ""  # of the link's process
+        self._undelivered: Undelivered | None = None
         self._cancel = rospy.Publisher("rapp_hop/cancel", String, queue_size=10)
         self._runs = rospy.Publisher("rapp_hop/runs", String, queue_size=10)
         self._events = rospy.Subscriber("rapp_hop/events", HopEvent, self._take, queue_size=1000, tcp_nodelay=True)
@@ -55,6 +57,11 @@ class RosHop:
     def present(self) -> bool:
         """See `ports.Hop`."""
         return time.monotonic() - self._alive < SILENCE
+
+    @property
+    def undelivered(self) -> Undelivered | None:
+        """See `ports.Hop`."""
+        return self._undelivered if self.present else None
 
     def _reachable(self) -> bool:
         """Whether the link is there and its events would arrive: each topic is connected by itself."""
@@ -152,7 +159,10 @@ class RosHop:
 
     def _sign_of_life(self, message: Any) -> None:
         with contextlib.suppress(ValueError, TypeError, KeyError):
-            self._boot = str(json.loads(message.data)["boot"])
+            sign = json.loads(message.data)
+            self._boot = str(sign["boot"])
+            mail = sign.get("undelivered")
+            self._undelivered = Undelivered(str(mail["message_id"]), tuple(map(str, mail["recipients"]))) if mail else None
         self._alive = time.monotonic()
 
 

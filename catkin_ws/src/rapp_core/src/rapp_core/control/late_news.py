@@ -1,0 +1,42 @@
+"""What the person has to be told although the run it comes from is over: a mail that was kept, and was then refused."""
+
+import logging
+from collections.abc import Callable
+
+from rapp_core.control.refusals import not_delivered
+from rapp_core.errors import CoreError
+from rapp_core.ports import Hop
+
+NOTED = 2.0  # s for the link to note that the person knows
+
+_log = logging.getLogger(__name__)
+
+
+class LateNews:
+    """Says each of them once it has a chance to, and tells the link, which keeps them over a restart of either."""
+
+    def __init__(self, hop: Hop, say: Callable[[str], bool]) -> None:
+        """`say` gives whether it was said."""
+        self._hop = hop
+        self._say = say
+        self._said: set[str] = set()  # Message-IDs; the link may not have noted it yet
+
+    @property
+    def waits(self) -> bool:
+        """Whether there is something to say."""
+        mail = self._hop.undelivered
+        return mail is not None and mail.message_id not in self._said
+
+    def tell(self) -> None:
+        """Say what there is; what could not be said stays for the next time."""
+        mail = self._hop.undelivered
+        if mail is None:
+            return
+        if mail.message_id not in self._said:
+            if not self._say(not_delivered(mail.recipients)):
+                return
+            self._said.add(mail.message_id)
+        try:
+            self._hop.request("mail_told", {"message_id": mail.message_id}, NOTED)
+        except CoreError as error:
+            _log.warning("%s", error)
