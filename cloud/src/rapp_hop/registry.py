@@ -96,15 +96,18 @@ class ServiceRegistry:
 
         :raises Refused: with status 404, when the service has had its calls
         """
-        if item.name in self._left:
-            self._left[item.name] -= 1
-            if self._left[item.name] <= 0:
-                self._forget(item)
+        if item.ttl is None:
+            return
+        if item.name not in self._left:  # it was here when the head of the request came
+            raise _unknown(item.name)
+        self._left[item.name] -= 1
+        if self._left[item.name] <= 0:
+            self._forget(item)
 
     def _found(self, path: str, name: str) -> Service:
         item = self._here(path)
         if item is None:
-            raise Refused(f"cannot find a service {name[:70]!r}: see /hop/available_services", 404)
+            raise _unknown(name)
         return item
 
     def _here(self, path: str) -> Service | None:
@@ -118,3 +121,7 @@ class ServiceRegistry:
         self._by_path.pop(item.path, None)
         for book in (self._paths, self._left, self._ends):
             book.pop(item.name, None)
+
+
+def _unknown(name: str) -> Refused:
+    return Refused(f"cannot find a service {name[:70]!r}: see /hop/available_services", 404)

@@ -52,6 +52,8 @@ def test_calls_at_once_are_bounded(short: Path) -> None:
         with pytest.raises(Unreachable, match=f"{CALLS} calls of this cloud agent are open"):
             await done.pop()
         await client.close()
+        for call in calls:
+            call.cancel()
         await asyncio.gather(*calls, return_exceptions=True)
 
     before_a_platform_that_never_answers(short, test)

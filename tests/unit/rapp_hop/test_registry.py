@@ -59,6 +59,16 @@ def test_unregister_and_register_again() -> None:
     assert not gone(registry, "/hop/hello")
 
 
+def test_ttl_holds_for_calls_whose_heads_came_before() -> None:
+    registry = ServiceRegistry([make(ttl=1), make(name="forever")])
+    items = [registry.at("/hop/hello") for _ in range(2)]
+    registry.spend(items[0])
+    with pytest.raises(Refused) as caught:
+        registry.spend(items[1])
+    assert caught.value.status == 404
+    registry.spend(registry.get("forever"))
+
+
 def test_ttl_counts_calls() -> None:
     registry = ServiceRegistry([make(ttl=2)])
     registry.spend(registry.at("/hop/hello"))
