@@ -63,6 +63,11 @@ def test_nothing_to_say_is_refused() -> None:
         config("--message", "  ")
 
 
+def test_a_message_that_cannot_be_judged_is_refused() -> None:
+    with pytest.raises(UsageError, match="three letters"):
+        config("--message", "I am ok")
+
+
 def test_a_story_has_its_own_words() -> None:
     assert config().story == VOICE_MAIL
     assert config(SHOW_AROUND).command == KEYWORDS[SHOW_AROUND]

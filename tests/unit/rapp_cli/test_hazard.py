@@ -76,9 +76,12 @@ def judged(folder: Path, said: str, mails: Sequence[str] = (), touched: Sequence
         story=HAZARD, folder=folder, command="is everything safe", recipient="", message="", voice="", robot=None, cloud=None,
         mail=None, address=ADDRESS, timeout=1.0, obstacle=False, silent=True, **wishes,
     )  # fmt: skip
-    (folder / "new").mkdir()
-    for number, text in enumerate(mails):
-        (folder / "new" / str(number)).write_text(f"To: {ADDRESS}\nSubject: safe?\n\n{text}\n")
+
+    def put(name: str, text: str) -> None:
+        (folder / "new").mkdir(exist_ok=True)
+        (folder / "new" / name).write_text(f"To: {ADDRESS}\nSubject: safe?\n\n{text}\n")
+
+    put("of a run before", OPEN)
 
     async def story() -> tuple[int, Room]:
         timeline = Timeline()
@@ -86,6 +89,8 @@ def judged(folder: Path, said: str, mails: Sequence[str] = (), touched: Sequence
         room = Room(timeline, said, list(touched))
         hazard = Hazard(config, SimpleNamespace(maildir=folder, logs=folder))  # type: ignore[arg-type]
         await hazard.live(room, timeline)  # type: ignore[arg-type]
+        for number, text in enumerate(mails):
+            put(str(number), text)
         return await hazard.judge(timeline), room
 
     return asyncio.run(story())

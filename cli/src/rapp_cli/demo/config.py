@@ -10,6 +10,7 @@ from pathlib import Path
 import platformdirs
 
 from rapp_cli import mail_account
+from rapp_cli.demo.mailbox import words_heard
 from rapp_cli.errors import UsageError
 from rapp_cli.mail_account import MailAccount
 
@@ -87,6 +88,8 @@ def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> De
     _check_story(options, env)
     if not options.recipient.strip() or not options.message.strip():
         raise UsageError("cannot send a voice-mail without --recipient and --message")
+    if not words_heard(options.message, options.message):
+        raise UsageError(f"cannot judge whether “{options.message}” arrives: give a --message with a word of three letters or more")
     return DemoConfig(
         story=options.story,
         folder=(options.folder or _new_folder()).resolve(),

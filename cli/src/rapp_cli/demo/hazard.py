@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from email.policy import default
 from pathlib import Path
 
+from rapp_cli.demo import mailbox
 from rapp_cli.demo.config import DemoConfig
 from rapp_cli.demo.story import converse
 from rapp_cli.demo.system import System
@@ -45,6 +46,7 @@ class Hazard:
     def __init__(self, config: DemoConfig, system: System) -> None:
         self._config = config
         self._system = system
+        self._old = mailbox.mails(system.maildir)  # of a run before, in the same folder
         self._truth: Truth | None = None
         self._touched: list[str] = []
 
@@ -72,7 +74,7 @@ class Hazard:
             print(f"\nsaid       {said[-1] if said else 'nothing'}")
             return 0 if any("the door is" in text and "the lamp is" in text for text in said) else 1
         wanted = self._config.write and not self._truth.safe
-        mails = await _mails(self._system.maildir, self._config.address, MAIL if wanted else 0.0)
+        mails = await self._mails(MAIL if wanted else 0.0)
         wrong = [*contradictions(said, self._truth), *_mail_wrong(mails, self._truth, wanted)]
         wrong += [f"it has touched {', '.join(self._touched)}"] if self._touched else []
         print(f"\nroom       {self._truth}")
@@ -81,6 +83,17 @@ class Hazard:
         if wrong:
             print(f"rapp demo: {'; '.join(wrong)}; the logs are in {self._system.logs}", file=sys.stderr)
         return 1 if wrong else 0
+
+    async def _mails(self, patience: float) -> list[Path]:
+        """The new mails to the recipient, once there is one."""
+        loop = asyncio.get_running_loop()
+        until = loop.time() + patience
+        while True:
+            new = [mail for mail in mailbox.mails(self._system.maildir) if mail not in self._old]
+            found = [mail for mail in new if self._config.address in mail.read_text(errors="replace")]
+            if found or loop.time() >= until:
+                return found
+            await asyncio.sleep(0.1)
 
 
 def contradictions(said: Sequence[str], truth: Truth) -> list[str]:
@@ -111,14 +124,3 @@ def _mail_wrong(mails: Sequence[Path], truth: Truth, wanted: bool) -> list[str]:
         return [f"{len(mails)} mails have come in place of {int(wanted)}"]
     texts = [email.message_from_bytes(mail.read_bytes(), policy=default).get_body(("plain",)) for mail in mails]
     return [f"in the mail {wrong}" for text in texts for wrong in contradictions([text.get_content() if text else ""], truth)]
-
-
-async def _mails(maildir: Path, address: str, patience: float) -> list[Path]:
-    """The mails to an address, once there is one."""
-    loop = asyncio.get_running_loop()
-    until = loop.time() + patience
-    while True:
-        found = [mail for mail in sorted(maildir.glob("**/new/*")) if address in mail.read_text(errors="replace")]
-        if found or loop.time() >= until:
-            return found
-        await asyncio.sleep(0.1)

@@ -2,7 +2,8 @@
 
 import asyncio
 import email
-from collections.abc import Sequence
+import shutil
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from email.policy import default
 from pathlib import Path
@@ -23,10 +24,18 @@ class Delivered:
     recipient: str
 
 
-async def wait_for_mail(maildir: Path, recordings: Path) -> Delivered:
-    """Wait until a mail with an audio attachment lies in the Maildir; saves the attachment into `recordings`."""
+def mails(maildir: Path) -> list[Path]:
+    """The mails that lie there, oldest first."""
+    return sorted(maildir.glob("**/new/*"))
+
+
+async def wait_for_mail(maildir: Path, recordings: Path, old: Collection[Path] = ()) -> Delivered:
+    """Wait until a mail with an audio attachment lies in the Maildir that is none of the old ones; gives the newest.
+
+    Saves the attachment into `recordings`.
+    """
     while True:
-        for path in sorted(maildir.glob("**/new/*")):
+        for path in reversed([path for path in mails(maildir) if path not in old]):
             message = email.message_from_bytes(path.read_bytes(), policy=default)
             for part in message.iter_attachments():
                 if part.get_content_type() in ("audio/ogg", "application/ogg"):
@@ -35,6 +44,16 @@ async def wait_for_mail(maildir: Path, recordings: Path) -> Delivered:
                     recording.write_bytes(part.get_content())
                     return Delivered(path, recording, str(message["To"]))
         await asyncio.sleep(0.1)
+
+
+def keep_recording(runs: Path, recordings: Path) -> Path | None:
+    """Copy what a run on the robot has recorded last, which goes with the run; None when there is nothing (any more)."""
+    try:
+        found = sorted(runs.glob("*/recordings/*.ogg"), key=lambda path: path.stat().st_mtime)
+        recordings.mkdir(parents=True, exist_ok=True)
+        return Path(shutil.copy(found[-1], recordings)) if found else None
+    except FileNotFoundError:
+        return None
 
 
 def words_heard(said: str, heard: str) -> Sequence[str]:
