@@ -81,7 +81,7 @@ def checks_of(memory: Memory, data: Path, timestamp: Path, certificate: Certific
         if certificate is not None and certificate.left() < 0:
             raise Unreachable(f"cannot be trusted: {certificate.name} has expired at {certificate.end}, put a new one in its place")
 
-    return [memory.database.check, store, disk, tls]
+    return [memory.database.check, memory.check, store, disk, tls]
 
 
 class _Kept:

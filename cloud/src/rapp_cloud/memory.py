@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
@@ -16,9 +17,10 @@ from rapp_cloud.quotas import Quotas
 from rapp_cloud.registrations import Registrations
 from rapp_cloud.reports import Reports
 from rapp_cloud.robots import Robots
-from rapp_hop.errors import HopError
+from rapp_hop.errors import Bug, HopError, Unreachable
 
 STEP = 0.5  # seconds in which the process sees what a command has changed, and in which leases and counts are written
+OVERDUE = 30.0  # seconds after which a platform is not ready that has not done a whole step; a locked database takes 5 a try
 _log = logging.getLogger(__name__)
 
 
@@ -33,6 +35,22 @@ class Memory:
         self.quotas = Quotas(database)
         self.audit = Audit(database, folder)
         self.reports = Reports(database)
+        self._stepped = time.monotonic()
+
+    def stepped(self) -> None:
+        """Remember that all is in step with the database now."""
+        self._stepped = time.monotonic()
+
+    def check(self) -> None:
+        """Look whether what is known from memory is still that of the database.
+
+        :raises Unreachable: when it has not been in step for too long
+        """
+        since = time.monotonic() - self._stepped
+        if since > OVERDUE:
+            raise Unreachable(
+                f"cannot keep accounts, leases and audit log in step with the database for {since:.0f} s: see the log"
+            )
 
 
 @contextmanager
@@ -93,14 +111,24 @@ async def _keep_in_step(memory: Memory, registrations: Registrations, stop: asyn
     while not stop.is_set():
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(stop.wait(), STEP)
+        error = await _step(memory, registrations)
+        if error is None:
+            memory.stepped()
+        elif well:  # said once, not at every step
+            bug = error if isinstance(error, Bug) or not isinstance(error, HopError) else None
+            _log.error("%s; tokens, people and leases are those of before meanwhile", error, exc_info=bug)
+        well = error is None
+
+
+async def _step(memory: Memory, registrations: Registrations) -> Exception | None:
+    """Do all of a step that can be done; return what was wrong."""
+    wrong: Exception | None = None
+    steps = (memory.accounts.refresh, memory.people.refresh, registrations.write, memory.quotas.write, memory.audit.write)
+    for step in steps:
         try:
-            await asyncio.to_thread(memory.accounts.refresh)
-            await asyncio.to_thread(memory.people.refresh)
-            await asyncio.to_thread(registrations.write)
-            await asyncio.to_thread(memory.quotas.write)
-            await asyncio.to_thread(memory.audit.write)
-            well = True
-        except HopError as error:
-            if well:  # said once, not at every step
-                _log.error("%s; tokens, people and leases are those of before meanwhile", error)
-            well = False
+            await asyncio.to_thread(step)
+        except Unreachable as error:
+            return error  # the next one would fare no better
+        except Exception as error:  # noqa: BLE001 (one fault must not end the platform's bookkeeping)
+            wrong = wrong or error
+    return wrong

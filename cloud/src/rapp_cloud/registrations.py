@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 
 import sqlalchemy as sa
+from sqlalchemy.dialects import postgresql, sqlite
 
 from rapp_cloud.catalogue import RobotKind
 from rapp_cloud.database.engine import Database
@@ -44,9 +45,15 @@ class Registrations:
         ahead = self._clock() - self._here.now()
         rows = [
             {"name": name, "kind": lease.kind.kind, "api_version": lease.kind.api_version, "until": lease.until + ahead}
-            for name, lease in changed.items()
+            for name, lease in sorted(changed.items())  # in one order, so that two writers do not wait for each other
         ]
         with self._database.writing() as connection:
-            connection.execute(sa.delete(robots).where(robots.c.name == sa.bindparam("old")), [{"old": name} for name in changed])
-            connection.execute(sa.insert(robots), rows)
+            connection.execute(self._putting(), rows)
         self._written = leases
+
+    def _putting(self) -> sa.Insert:
+        """Another process may write the same robot at the same time; the later one stays."""
+        new = (postgresql if self._database.server else sqlite).insert(robots)
+        changes = {name: new.excluded[name] for name in ("kind", "api_version", "until")}
+        found: sa.Insert = new.on_conflict_do_update(index_elements=["name"], set_=changes)
+        return found

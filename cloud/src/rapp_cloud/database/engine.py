@@ -13,10 +13,10 @@ import alembic.command
 import alembic.config
 import alembic.util
 import sqlalchemy as sa
-from sqlalchemy.exc import ArgumentError, DBAPIError, OperationalError
+from sqlalchemy.exc import ArgumentError, DBAPIError, OperationalError, SQLAlchemyError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
-from rapp_hop.errors import Invalid, Refused, Unreachable
+from rapp_hop.errors import Bug, Invalid, Refused, Unreachable
 
 FILE = "platform.sqlite"
 WAIT = 5.0  # seconds for a lock, or for a server to answer
@@ -69,6 +69,7 @@ class Database:
 
         :raises Unreachable: when the database is away or locked
         :raises Invalid: when it is damaged
+        :raises Bug: for all else that it says no to
         """
         level: dict[str, Any] = {"isolation_level": "REPEATABLE READ"} if self.server else {}
         with _translated(), self._engine.connect().execution_options(**level) as connection, connection.begin():
@@ -164,6 +165,9 @@ def _translated() -> Iterator[None]:
             raise Invalid(f"cannot use the database: {what}; restore a back-up") from error
         if isinstance(error, OperationalError) or error.connection_invalidated:
             raise Unreachable(f"cannot use the database now: {what}; try again later") from error
-        raise
+        raise Bug(f"cannot do this in the database: {what}; that is a fault of the platform, tell its makers") from error
     except PoolTimeoutError as error:
         raise Unreachable("cannot use the database now: too many wait for it; try again later") from error
+    except SQLAlchemyError as error:
+        what = type(error).__name__
+        raise Bug(f"cannot use the database: {what}; that is a fault of the platform, tell its makers") from error
