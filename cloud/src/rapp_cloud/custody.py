@@ -16,10 +16,9 @@ from rapp_cloud.keys import ROLES, ROOTS
 from rapp_cloud.ledger import Ledger, Lists
 from rapp_hop.errors import Refused
 from rapp_hop.hz.application import Application
-from rapp_hop.hz.standing import KNOWN, RESTORED, YANKED, Standing, package_of, pattern
+from rapp_hop.hz.standing import KNOWN, RESTORED, REVOKED, YANKED, Standing, package_of, pattern
 from rapp_hop.hz.text import check_name
 
-_REVOKED = "revoked"  # in targets: publishers, with their keys and names
 _ROOTS = 8  # written at a resumption: robots may have seen some after the back-up
 
 
@@ -144,7 +143,7 @@ class Custody:
             if role is None:
                 raise Refused(f"cannot revoke the key of {publisher}: it has none, see ./rapp keys list")
             names = [package_of(path) for path in role.paths or ()]
-            lists.targets.unrecognized_fields[_REVOKED] = {
+            lists.targets.unrecognized_fields[REVOKED] = {
                 **_revoked(lists), publisher: {"keyids": list(role.keyids), "names": names},
             }  # fmt: skip
             for keyid in list(role.keyids):
@@ -230,7 +229,8 @@ def add_publisher(ledger: Ledger, lists: Lists, publisher: str) -> Targets:
     own.version = known.version if known else 0
     if known:  # its packages stay known, so that no version comes back with other bytes
         old = ledger.list_of(publisher, known.version)
-        own.unrecognized_fields[YANKED] = Standing(publisher, lists.targets, old).known
+        before = own.unrecognized_fields[YANKED] = Standing(publisher, lists.targets, old).known
+        lists.targets.unrecognized_fields.setdefault(KNOWN, {})[publisher] = before  # for robots that were away meanwhile
     lists.publishers[publisher] = own
     return own
 
@@ -309,5 +309,5 @@ def owner_of(lists: Lists, name: str) -> str | None:
 
 
 def _revoked(lists: Lists) -> dict[str, dict[str, list[str]]]:
-    found: dict[str, dict[str, list[str]]] = lists.targets.unrecognized_fields.setdefault(_REVOKED, {})
+    found: dict[str, dict[str, list[str]]] = lists.targets.unrecognized_fields.setdefault(REVOKED, {})
     return found

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from rapp_hop import strict_json
-from rapp_hop.errors import Invalid, Refused, Unreachable
+from rapp_hop.errors import HopError, Invalid, Refused, Unreachable
 from rapp_hop.hz.delivery import Delivery
 from rapp_link.agents import CloudAgents
 from rapp_link.cloud_side import Identity, Platform
@@ -83,7 +83,10 @@ class Commands:
         return await self._platform.register(Identity(robot, kind, version), ticket.remaining)
 
     async def list_rapps(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
-        """{} → {rapps}; the last list, with "fresh": false, while the platform is away."""
+        """{} → {rapps, revoked}; the last list, with "fresh": false, while the platform is away.
+
+        `revoked`: installed RApps signed by revoked keys only, which are removed, or would be if the disk let them go.
+        """
         take(arguments)
         try:
             answer = await self._platform.call("list_rapps", {"robot": self._platform.robot}, ticket.remaining - MARGIN)
@@ -95,13 +98,10 @@ class Commands:
             return known | {"fresh": False}
         if not isinstance(answer, dict) or not isinstance(answer.get("rapps"), list):
             raise Invalid("cannot list RApps: the platform's answer is no list")
+        answer["revoked"] = await self._drop_revoked(ticket)
         await in_thread(self._keep_list, answer)
         return answer
 
-    async def interpret(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
-        """{recording, language} → {rapp | null, confidence, text, candidates, choice}."""
-        recording, language = take(arguments, recording=str, language=str)
-        if not _LANGUAGE.fullmatch(language):
     async def _drop_revoked(self, ticket: Ticket) -> list[str]:
         if self._delivery is None:
             return []
@@ -113,6 +113,10 @@ class Commands:
             _log.warning("cannot see which keys were revoked: %s", error or "the store is too slow")
             return []
 
+    async def interpret(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
+        """{recording, language} → {rapp | null, confidence, text, candidates, choice}."""
+        recording, language = take(arguments, recording=str, language=str)
+        if not _LANGUAGE.fullmatch(language):
             raise Refused(f"cannot interpret the language {language[:20]!a}: give one such as en")
         path = await in_thread(shared_file, self._config.home, recording)
         return await self._platform.call("interpret", {"language": language}, ticket.remaining, recording=path)
@@ -181,14 +185,10 @@ class Commands:
             raise Refused("cannot send mail: the robot has no mail account, start the link with --smtp-host")
         letter = await in_thread(self._put, arguments)
         letter = await self._postman.deliver(letter, max(0.0, ticket.remaining - MARGIN))
-        return _told(letter)
-
-    async def report(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
-        """{run} → {kept}; it goes to the platform as soon as that can be reached. False: it has it already."""
         if letter.untold:
             await self._note_told(letter.message_id, late=False)
-        (run,) = take(arguments, run=dict)
-        if self._gone_back and run.get("run") == self._gone_back["run"]:
+        return _told(letter)
+
     async def mail_told(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
         """{message_id} → {told}: the person knows that a mail which was kept was refused (see `sign_of_life`)."""
         (message_id,) = take(arguments, message_id=str)
@@ -201,6 +201,10 @@ class Commands:
         except Refused as error:
             _log.error("%s", error)
 
+    async def report(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
+        """{run} → {kept}; it goes to the platform as soon as that can be reached. False: it has it already."""
+        (run,) = take(arguments, run=dict)
+        if self._gone_back and run.get("run") == self._gone_back["run"]:
             run = {**run, **self._gone_back}
         kept = await in_thread(self._reports.keep, run)
         self._platform.hurry()

@@ -4,7 +4,9 @@ Each form is that of rapp_msgs/AgentState. A call without a reply is told as a n
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -22,6 +24,17 @@ _AGENT = re.compile(r"agents/[^/]+/(.+)")  # address of a cloud agent's service,
 _HASH = re.compile(r"^[0-9a-f]{64}\.")  # before the name of a file of the store
 
 Tell = Callable[[str], None]
+_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+
+
+@contextmanager
+def untold() -> Iterator[None]:
+    """Tell nothing of what is fetched within, threads and tasks of it included: a look that comes again and again."""
+    token = _quiet.set(True)
+    try:
+        yield
+    finally:
+        _quiet.reset(token)
 
 
 class TellingClient(HopClient):
@@ -61,6 +74,8 @@ class TellingClient(HopClient):
         """See `HopClient`."""
         name = _HASH.sub("", urlsplit(path).path.rpartition("/")[2])
         work = super().download(path, destination, limit, timeout, on_progress, start)
+        if _quiet.get():
+            return await work
         count: int = await self._told(REPOSITORY, f"GET {name}{f' from byte {start}' if start else ''}", work)
         return count
 

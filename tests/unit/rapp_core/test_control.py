@@ -2,6 +2,7 @@
 
 import errno
 import json
+import shutil
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -129,7 +130,6 @@ def test_waits_for_a_robot_that_is_off(home: Home) -> None:
     assert 30.0 <= home.clock.time < 32.0
 
 
-# ways through
 # late news
 
 
@@ -160,6 +160,7 @@ def test_late_news_that_cannot_be_said_waits_and_the_link_hears_nothing_of_it(ho
     assert home.fake.said()[-1] == not_delivered(("e@home.example",))
 
 
+# ways through
 
 
 def test_an_isolated_keyword_runs_its_rapp(home: Home) -> None:
@@ -889,6 +890,36 @@ def test_when_an_update_is_not_to_be_trusted_nothing_runs(home: Home) -> None:
     home.link.errors["install"] = error
     home.round()
     assert home.fake.said() == ["I refuse to install clock, it is older than what I had"]
+    assert home.agents.runs == []
+
+
+@pytest.mark.parametrize("left", [False, True], ids=["removed", "still on the disk"])
+@pytest.mark.parametrize(
+    ("error", "reason", "said"),
+    [
+        (Invalid("no"), "revoked key", "I refuse to install clock, who made it is not trusted any more"),
+        (Invalid("broken"), "", "I cannot install clock"),
+        (Refused("no such RApp"), "", "I cannot install clock"),
+        (Unreachable("away"), "", "I cannot reach the platform"),
+    ],
+)
+def test_what_was_revoked_is_never_started_and_the_robot_says_so(
+    home: Home, error: CoreError, reason: str, said: str, left: bool
+) -> None:
+    error.reason = reason
+    path = install_rapp(home.config.home, "clock", keywords=("what time is it",))
+
+    def revoke(_arguments: object) -> dict[str, Any]:
+        if not left:
+            shutil.rmtree(path.parent)
+        return {"rapps": [], "revoked": ["clock"]}
+
+    home.link.answers["list_rapps"] = revoke
+    home.link.errors["install"] = error
+    home.start()
+    ask(home)
+    assert home.round() == ["s3", "s4", "s6", "s11", "s3"]
+    assert home.fake.said() == [said]
     assert home.agents.runs == []
 
 

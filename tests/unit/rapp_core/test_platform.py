@@ -1,5 +1,6 @@
 """What the core agent knows of platform and installed RApps."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,31 @@ def test_a_newer_offer_is_downloaded(platform: Platform, link: FakeLink, tmp_pat
     link.catalogue[0]["version"] = "1.1.0"
     platform.attempt()
     assert platform.runnable("clock") is None
+
+
+def test_what_was_revoked_is_not_run_and_still_understood(platform: Platform, link: FakeLink, tmp_path: Path) -> None:
+    for name in ("parrot", "owl"):
+        install_rapp(tmp_path, name)
+    link.answers["list_rapps"] = {"rapps": [], "revoked": ["parrot", "crow"]}
+    platform.attempt()
+    assert platform.runnable("parrot") is None  # though the link has not removed it
+    assert {name: (known.keywords, known.path is None) for name, known in platform.rapps().items()} == {
+        "owl": (("owl",), False), "parrot": (("parrot",), True),
+    }  # fmt: skip
+    shutil.rmtree(tmp_path / "rapps" / "parrot")
+    link.answers["list_rapps"] = {"rapps": [], "revoked": []}
+    platform.attempt()
+    assert platform.rapps()["parrot"].keywords == ("parrot",)
+
+
+def test_a_revoked_rapp_that_is_on_offer_again_is_as_any_other(platform: Platform, link: FakeLink, tmp_path: Path) -> None:
+    path = install_rapp(tmp_path, "parrot")
+    link.answers["list_rapps"] = {"rapps": [], "revoked": ["parrot"]}
+    platform.attempt()
+    link.answers["list_rapps"] = {"rapps": [entry("parrot")], "revoked": []}
+    platform.attempt()
+    known = platform.runnable("parrot")
+    assert known is not None and known.path == path
 
 
 def test_a_broken_installation_hides_no_other(platform: Platform, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from rapp_hop.client import HopClient
 from rapp_hop.errors import HopError, Refused, Unreachable
 from rapp_link.letter import Outcome
 from rapp_link.smtp import Locked
-from rapp_link.telling import TellingClient, TellingSender
+from rapp_link.telling import TellingClient, TellingSender, untold
 
 
 def answering(monkeypatch: pytest.MonkeyPatch, answer: Any) -> tuple[TellingClient, list[str]]:
@@ -64,6 +64,21 @@ def test_what_is_asked_again_and_again_is_not_told(monkeypatch: pytest.MonkeyPat
     client, told = answering(monkeypatch, {})
     asyncio.run(client.call(service))
     assert told == []
+
+
+def test_a_look_at_the_store_that_comes_again_and_again_is_not_told_and_what_follows_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    client, told = answering(monkeypatch, 12)
+
+    async def looks() -> None:
+        loop = asyncio.get_running_loop()
+        get = client.download("http://127.0.0.1:1/tuf/metadata/timestamp.json", bytearray().extend, 20)
+        with untold():
+            await asyncio.to_thread(lambda: asyncio.run_coroutine_threadsafe(get, loop).result())
+        assert told == []
+        await client.download("http://127.0.0.1:1/tuf/metadata/timestamp.json", bytearray().extend, 20)
+
+    asyncio.run(looks())
+    assert told == ["link->repository GET timestamp.json", "repository->link reply GET timestamp.json"]
 
 
 class Server:

@@ -29,8 +29,8 @@ from rapp_cli.home.place import home_of
 from rapp_cloud.keys import KeyRing, passphrase_from
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Refused
-from rapp_hop.hz.delivery import DeliveryLimits, LoopTransport
 from rapp_hop.hz.standing import Standing
+from rapp_hop.hz.transport import DeliveryLimits, LoopTransport
 from rapp_hop.hz.trust import Release, TrustedStore, Versions
 
 PATIENCE = 60.0  # s for a list

@@ -15,7 +15,7 @@ _MIXED = re.compile(r"Expected (snapshot version \d|\S+ v\d)")  # versions that 
 
 
 class Attack(StrEnum):
-    """What somebody who holds the line or the mirror may try; the names are TUF's (specification §1.5)."""
+    """What somebody who holds the line or the mirror may try; most names are TUF's (specification §1.5)."""
 
     UNSIGNED = "unsigned or signed by a wrong key"
     ROLLBACK = "rollback"
@@ -27,6 +27,7 @@ class Attack(StrEnum):
     SLOW = "slow retrieval"
     OTHER_ROBOT = "replay to another robot"
     CLOCK = "wrong clock"
+    REVOKED = "revoked key"
 
 
 class Untrusted(Invalid):

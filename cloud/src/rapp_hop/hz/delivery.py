@@ -5,41 +5,30 @@ bytes. Different RApps are installed side by side; who asks for one that is bein
 """
 
 import asyncio
-import concurrent.futures
-import threading
+import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
 from rapp_hop.client import HopClient
-from rapp_hop.errors import Refused, Unreachable
+from rapp_hop.errors import HopError, Refused
 from rapp_hop.hz.archive import inspect
 from rapp_hop.hz.downloads import Downloads
 from rapp_hop.hz.install import Installed, PackageFile, RappFolder, install
 from rapp_hop.hz.manifest import Manifest, reasons_against
 from rapp_hop.hz.quota import Claim, Quota, running, unpacked_size
 from rapp_hop.hz.semver import parse_version
-from rapp_hop.hz.tar import Limits
+from rapp_hop.hz.transport import DeliveryLimits, LoopTransport, in_thread
 from rapp_hop.hz.trust import Attack, Release, TrustedStore, Untrusted, Versions, choose
-from rapp_hop.streaming import Progress, Writer
+
+__all__ = ["Delivery", "DeliveryLimits", "OnPhase", "Recipient"]
 
 OnPhase = Callable[[str, dict[str, Any]], None]  # "downloading" | "verified" | "installed", and details
 _Tell = Callable[..., None]
 AT_ONCE = 3  # installations
-
-
-@dataclass(frozen=True)
-class DeliveryLimits:
-    """Bounds of a delivery."""
-
-    metadata_timeout: float = 10.0  # seconds per metadata file
-    package_timeout: float = 120.0  # seconds per package
-    slowest: float = 1024.0  # bytes per second on average over each `window`; less is slow retrieval
-    window: float = 5.0  # seconds
-    package: Limits = field(default_factory=Limits)
-    quota: int = 0  # bytes of all RApps and downloads on the disk; 0: no bound
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -94,14 +83,23 @@ class Delivery:
                 loop.call_soon_threadsafe(on_phase, phase, details)
 
         async with self._alone(name), self._places:
-            work = asyncio.ensure_future(asyncio.to_thread(self._install, transport, _Wish(name, version, robot), tell))
-            try:
-                return await asyncio.shield(work)
-            except asyncio.CancelledError:
-                transport.cancel()
-                await asyncio.wait([work])
-                work.exception()  # taken: the caller asked for the end, not for its reason
-                raise
+            return await in_thread(transport, self._install, transport, _Wish(name, version, robot), tell)
+
+    async def drop_revoked(self) -> frozenset[str]:
+        """Remove the RApps that are signed by revoked keys only; return their names, also of those the disk would not let go.
+
+        One that runs goes too: its run has a copy.
+
+        :raises HopError: when the store cannot be believed or reached; nothing was removed then
+        """
+        if not await asyncio.to_thread(self.folder.names):
+            return frozenset()
+        transport = LoopTransport(self._client, asyncio.get_running_loop(), self._limits)
+        found = await in_thread(transport, self._revoked, transport)
+        for name in found:
+            async with self._alone(name):
+                await asyncio.to_thread(self._drop, name)
+        return found
 
     async def remove(self, name: str) -> bool:
         """Remove a RApp and what has come of its next version; false when it was not there.
@@ -158,10 +156,26 @@ class Delivery:
         except OSError as error:
             raise Refused(f"cannot tidy up downloads: {error.strerror}, check the disk") from None
 
-    def _install(self, transport: "LoopTransport", wish: "_Wish", tell: _Tell) -> Installed:
-        store = TrustedStore(transport, f"{self._client.base_url}/tuf", self._root, self._home / "trust", self._limits.package)
+    def _store(self, transport: LoopTransport) -> TrustedStore:
+        return TrustedStore(transport, f"{self._client.base_url}/tuf", self._root, self._home / "trust", self._limits.package)
+
+    def _revoked(self, transport: LoopTransport) -> frozenset[str]:
+        return self._store(transport).revoked({name: self.folder.versions(name) for name in self.folder.names()})
+
+    def _drop(self, name: str) -> None:
+        try:
+            if self.folder.remove(name):
+                _log.warning("%s has gone, its publisher's key was revoked", name)
+        except HopError as error:
+            _log.error("%s", error)
+
+    def _install(self, transport: LoopTransport, wish: "_Wish", tell: _Tell) -> Installed:
+        store = self._store(transport)
         try:
             offered = store.versions(wish.name)
+            if offered.revoked:
+                self._drop(wish.name)
+                raise Untrusted(Attack.REVOKED, f"cannot install {wish.name}: its publisher's key was revoked, take another RApp")
             release = choose(offered, wish.name, wish.version, wish.robot.name if wish.robot else None)
             present = self._present(release, wish, offered)
             if present is not None:
@@ -234,61 +248,3 @@ class _Wish:
         reasons = reasons_against(manifest, self.robot.kind, self.robot.api_version) if self.robot else []
         if reasons:
             raise Refused(f"cannot install {self.name}: {'; '.join(reasons)}")
-
-
-class LoopTransport:
-    """Bytes for a thread, fetched by the client of a loop."""
-
-    def __init__(self, client: HopClient, loop: asyncio.AbstractEventLoop, limits: DeliveryLimits) -> None:
-        """Remember the parts."""
-        self._client = client
-        self._loop = loop
-        self._limits = limits
-        self._lock = threading.Lock()
-        self._running: concurrent.futures.Future[int] | None = None
-        self._cancelled = False
-
-    def get(self, url: str, write: Writer, limit: int, on_progress: Progress | None, start: int = 0) -> None:
-        """Fetch `url`; see `trust.Transport`."""
-        timeout = self._limits.metadata_timeout if "/metadata/" in url else self._limits.package_timeout
-        with self._lock:
-            if self._cancelled:
-                raise Unreachable(f"cannot fetch {url}: it was given up")
-            work = self._watched(url, write, limit, timeout, on_progress, start)
-            self._running = asyncio.run_coroutine_threadsafe(work, self._loop)
-        try:
-            self._running.result(timeout + 5)
-        except concurrent.futures.CancelledError:
-            raise Unreachable(f"cannot fetch {url}: it was given up") from None
-        except TimeoutError:
-            self._running.cancel()
-            raise Unreachable(f"cannot fetch {url} within {timeout:g} s: try again later") from None
-
-    async def _watched(self, url: str, write: Writer, limit: int, timeout: float, on_progress: Progress | None, start: int) -> int:
-        """Fetch, and give up a line that is kept open by a trickle (Uptane's slow retrieval)."""
-        count = before = 0
-
-        def counted(piece: bytes) -> object:
-            nonlocal count
-            count += len(piece)
-            return write(piece)
-
-        work = asyncio.ensure_future(self._client.download(url, counted, limit, timeout, on_progress, start))
-        try:
-            while not (await asyncio.wait([work], timeout=self._limits.window))[0]:
-                if 0 < count < before + self._limits.slowest * self._limits.window:
-                    slow = Unreachable(f"cannot fetch {url}: {Attack.SLOW}, {count} bytes so far, try again later")
-                    slow.reason = Attack.SLOW.value
-                    raise slow
-                before = count
-            return work.result()
-        finally:
-            work.cancel()
-            await asyncio.wait([work])
-
-    def cancel(self) -> None:
-        """End the fetch under way and refuse the next ones."""
-        with self._lock:
-            self._cancelled = True
-            if self._running is not None:
-                self._running.cancel()

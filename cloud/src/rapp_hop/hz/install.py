@@ -104,6 +104,11 @@ class RappFolder:
         found = self.root.iterdir() if self.root.is_dir() else iter(())
         return tuple(sorted(path.name for path in found if NAME.fullmatch(path.name) and path.is_dir()))
 
+    def versions(self, name: str) -> tuple[str, ...]:
+        """Return the versions of a RApp that may be started: the current one, and the one before while it is here."""
+        linked = (self._linked(check_name(name), link) for link in (CURRENT, PREVIOUS))
+        return tuple(version for version in linked if version is not None)
+
     def last_used(self, name: str) -> float:
         """Return when a RApp was installed or used last, in s since 1970; 0 when it is not there."""
         installed = self.find(name)

@@ -19,6 +19,7 @@ from rapp_hop.hz.manifest import Manifest
 
 YANKED = "yanked"  # in a publisher's list: packages that were taken off offer, hashes by path
 KNOWN = "known"  # in targets, by publisher: packages of lists from before a key was revoked, hashes by path
+REVOKED = "revoked"  # in targets: publishers whose key was revoked, with their keys and names
 MAX_LIST = 4_000_000  # bytes of a signed list; TUF's clients take 5 000 000
 RESTORED = "restored"  # in targets: when the store came back out of a back-up, without what was newer
 LASTS = timedelta(days=365)  # that the word of a publisher who keeps their own key is good
@@ -100,6 +101,11 @@ def signed(targets: Targets, signer: CryptoSigner) -> bytes:
     metadata: Metadata[Any] = Metadata(targets)
     metadata.sign(signer)
     return metadata.to_bytes()
+
+
+def revoked_names(targets: Targets) -> frozenset[str]:
+    """Return the packages that belong to publishers without a key, by the delegating list."""
+    return frozenset(name for entry in targets.unrecognized_fields.get(REVOKED, {}).values() for name in entry["names"])
 
 
 def yanked_of(targets: Targets) -> dict[str, str]:

@@ -13,7 +13,7 @@ Blocking: call it in a thread. One caller at a time (locks see to it).
 
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -33,7 +33,7 @@ from rapp_hop.hz.attacks import Attack, Away, Untrusted, translated, untrusted
 from rapp_hop.hz.downloads import partial
 from rapp_hop.hz.lock import held
 from rapp_hop.hz.semver import Version, parse_version
-from rapp_hop.hz.standing import RESTORED, YANKED, Standing
+from rapp_hop.hz.standing import KNOWN, RESTORED, YANKED, Standing, revoked_names
 from rapp_hop.hz.tar import Limits
 from rapp_hop.hz.text import check_name
 from rapp_hop.streaming import Progress, Writer
@@ -76,6 +76,7 @@ class Versions:
     releases: tuple[Release, ...]  # in order
     yanked: frozenset[str]  # versions taken off offer
     restored: bool = False  # the store came back out of a back-up, and may not know versions that it offered after it
+    revoked: bool = False  # their publisher has no key any more
 
 
 class TrustedStore:
@@ -109,7 +110,27 @@ class TrustedStore:
                 releases += [item for item in found if item is not None and item.name == name]
                 yanked |= _yanked(targets, name)
             restored = RESTORED in lists[0].unrecognized_fields
-            return Versions(tuple(sorted(releases, key=lambda item: item.version.key)), frozenset(yanked), restored)
+            revoked = name in revoked_names(lists[0])
+            return Versions(tuple(sorted(releases, key=lambda item: item.version.key)), frozenset(yanked), restored, revoked)
+
+    def revoked(self, installed: Mapping[str, Collection[str]]) -> frozenset[str]:
+        """Refresh the metadata and return the RApps of which nobody vouches for a version, because a key was revoked.
+
+        That of their publisher, who has none now, or one from before the present one; what was only yanked is not meant.
+
+        :param installed: versions by name
+        :raises Untrusted: naming the attack
+        :raises Unreachable: when the store cannot be reached or is not complete
+        """
+        with self._refreshed() as updater:
+            targets = self._cached("targets", Targets)
+            found = set(revoked_names(targets) & installed.keys())
+            paths = {package_file_name(name, version): name for name, versions in installed.items() for version in versions}
+            for publisher, known in targets.unrecognized_fields.get(KNOWN, {}).items():
+                if suspects := [path for path in paths if path in known]:
+                    own = self._newest(updater, targets, publisher, suspects[0])
+                    found |= {paths[path] for path in suspects if path not in own.targets}
+            return frozenset(found)
 
     def standings(self, publisher: str | None = None) -> list[Standing]:
         """Refresh the metadata and return how publishers stand who have a name, all lists verified; lists may have expired.

@@ -2,6 +2,7 @@
 
 import logging
 import threading
+from dataclasses import replace
 from typing import Any
 
 from rapp_core.config import Config
@@ -21,6 +22,7 @@ class Platform:
         self._config = config
         self._stop = threading.Event()
         self._offered: dict[str, Known] = {}
+        self._revoked: dict[str, Known] = {}  # were here; still understood, so that the link's refusal is said aloud
         self.changes = 0  # of what the platform offers
         self._registered = False
         self._thread: threading.Thread | None = None
@@ -41,11 +43,11 @@ class Platform:
 
     def rapps(self) -> dict[str, Known]:
         """All RApps that can be asked for, by name; the installed form of one goes before the offered one."""
-        return {**self._offered, **installed(self._config.home, self._config.language)}
+        return {**self._revoked, **self._offered, **self._installed()}
 
     def runnable(self, name: str) -> Known | None:
         """The installed RApp when the platform offers no other version of it; it can be run without a download."""
-        known, offered = installed(self._config.home, self._config.language).get(name), self._offered.get(name)
+        known, offered = self._installed().get(name), self._offered.get(name)
         return known if known is not None and (offered is None or offered.version == known.version) else None
 
     def attempt(self) -> bool:
@@ -56,9 +58,11 @@ class Platform:
             if not self._registered:
                 self._hop.request("register", robot, config.register_timeout)
                 self._registered = True
+            here = self._installed()
             catalogue = self._hop.request("list_rapps", {}, config.register_timeout)
             known = map(self._known, catalogue["rapps"])
             offered = {entry.name: entry for entry in known if entry is not None}
+            revoked = {name: replace(here[name], path=None) for name in catalogue.get("revoked", ()) if name in here}
         except CoreError as error:
             _log.warning("not registered: %s", error)
             self._registered = False
@@ -66,10 +70,16 @@ class Platform:
         except (KeyError, TypeError, AttributeError) as error:
             _log.error("the platform's catalogue cannot be used: %r", error)
             return False
+        self._revoked = {name: known for name, known in self._revoked.items() if name not in offered} | revoked
         if offered != self._offered:
             self._offered = offered
             self.changes += 1
         return True
+
+    def _installed(self) -> dict[str, Known]:
+        """Without what was revoked, should it still be on the disk."""
+        found = installed(self._config.home, self._config.language).items()
+        return {name: known for name, known in found if name not in self._revoked or known.version != self._revoked[name].version}
 
     def _known(self, entry: dict[str, Any]) -> Known | None:
         if not entry.get("compatible", True):

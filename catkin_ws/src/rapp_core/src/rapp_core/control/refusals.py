@@ -18,6 +18,7 @@ _ATTACKS = {  # the link's reasons are TUF's names of attacks (rapp_hop.hz.attac
     "slow retrieval": "it comes too slowly",
     "replay to another robot": "it is for another robot",
     "wrong clock": "my clock is wrong",
+    "revoked key": "who made it is not trusted any more",
 }
 
 
@@ -40,11 +41,11 @@ def not_started(error: CoreError) -> str:
     return AWAY if isinstance(error, Unreachable) else "I cannot start its part in the cloud"
 
 
-def not_activated(error: CoreError) -> str:
 def not_delivered(recipients: Sequence[str]) -> str:
     """What to say of a mail that was kept, and that the mail server has then refused, or not taken for days."""
     return f"The mail server does not take your message to {' and '.join(recipients)}, I could not send it, and keep it"
 
 
+def not_activated(error: CoreError) -> str:
     """What to say of a RApp whose dynamic agent was not started."""
     return "I cannot start it, I lack what it is written in" if error.reason == NO_RUNTIME else "I cannot start it"
