@@ -44,6 +44,40 @@ def test_a_robot_that_has_fallen_is_not_made_to_get_up(bench: Bench) -> None:
     assert leave(bench, "Sit") == ["rest"]
 
 
+def fail(bench: Bench, posture: str) -> None:
+    """The robot ends the way to a posture by itself."""
+    take_posture = bench.fake.motion.take_posture
+
+    def begin(name: str, speed: float) -> FakeMovement:
+        movement = take_posture(name, speed)
+        if name == posture:
+            movement.halt()
+        return movement
+
+    bench.fake.motion.take_posture = begin  # type: ignore[method-assign]
+
+
+def test_a_robot_that_does_not_come_back_to_its_posture_rests_where_it_is(bench: Bench) -> None:
+    fail(bench, "Sit")
+    assert leave(bench, "Sit") == ["posture Sit at 0.6", "rest"]
+    assert not bench.fake.motion.awake
+    assert bench.context.calls.take_before() is None
+
+
+def test_a_robot_that_does_not_even_rest_is_told_of_and_put_back_another_time(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
+    bench.fake.motion.release = lambda: Ended(bench.fake.body)  # type: ignore[method-assign]
+    leave(bench, "Stand")
+    assert "not back at rest: cannot finish: the robot has ended rest by itself" in caplog.text
+    assert bench.context.calls.take_before() == "Stand"
+
+
+def test_a_way_back_that_a_person_stops_is_not_followed_by_a_rest(bench: Bench) -> None:
+    bench.clock.at(3.0, lambda: bench.call("rapp_move_stop"))  # a posture takes 2 s
+    assert leave(bench, "Sit") == ["posture Sit at 0.6", "stop motion"]
+
+
 def test_it_is_brought_back_once_and_not_when_nothing_has_moved_it(bench: Bench) -> None:
     leave(bench)
     bench.fake.journal.clear()
@@ -88,3 +122,11 @@ class Endless(FakeMovement):
     def wait(self, seconds: float) -> bool:
         time.sleep(0.001)  # of the test's own: the clock belongs to the other thread
         return self.done()
+
+
+class Ended(FakeMovement):
+    """A motion that the robot has ended by itself."""
+
+    def __init__(self, body: Any) -> None:
+        super().__init__(body, math.inf, lambda: None, lambda: None)
+        self.halt()

@@ -13,7 +13,7 @@ from rapp_core.launcher.lease import Grant
 from rapp_core.services.calls import Call
 from rapp_core.services.context import Context, Reply, execute, subsystem
 from rapp_core.services.posture import comes_back
-from rapp_core.services.table import CORE_SERVICES, CoreService
+from rapp_core.services.table import CORE_SERVICES, PUT_BACK, CoreService
 
 PATIENCE = 10.0  # s a call waits for a resource another call holds
 STEP = 0.05  # s between two looks while it does
@@ -65,25 +65,24 @@ class Executor:
         if before is None:
             return
         try:
-            if comes_back(self._context, before):
-                self._aside(lambda: self._come_back(before))
-            else:
-                self._context.robot.motion.release()
+            posture = before if comes_back(self._context, before) else ""
         except CoreError as error:
             _log.warning("%s", error)
+            return
+        self._aside(lambda: self._come_back(before, posture))
 
-    def _come_back(self, before: str) -> None:
+    def _come_back(self, before: str, posture: str) -> None:
         call = Call()
         call.yields = call.puts_back = True
         try:
-            self._execute("rapp_rest", {"posture": before}, replace(self._context, call=call), preempt=True)
+            self._execute(PUT_BACK, {"posture": posture}, replace(self._context, call=call), preempt=True)
         except CoreError as error:
-            _log.info("the robot is not back in posture %s: %s", before, error)
+            _log.log(logging.INFO if call.ended else logging.WARNING, "the robot is not back at rest: %s", error)
             self._context.calls.keep_before(before)
 
     def run(self, name: str, /, call: Call | None = None, **request: Any) -> Reply:
         """Execute one service for the core agent itself; gives its reply. Raises CoreError."""
-        return self._execute(name, request, replace(self._context, call=call or Call()), preempt=False)
+        return self._execute(self._services[name], request, replace(self._context, call=call or Call()), preempt=False)
 
     def run_for(self, grant: Grant, name: str, /, call: Call | None = None, preempt: bool = False, **request: Any) -> Reply:
         """Execute one service for the dynamic agent that holds the lease; cut short when the lease ends. Raises CoreError.
@@ -92,10 +91,10 @@ class Executor:
         """
         run = grant.run
         context = replace(self._context, cut=grant.cut, recordings=run.recordings, package=run.package, call=call or Call())
-        return self._execute(name, request, context, preempt)
+        return self._execute(self._services[name], request, context, preempt)
 
-    def _execute(self, name: str, request: dict[str, Any], context: Context, preempt: bool) -> Reply:
-        service, share = self._services[name], subsystem(name, **request)
+    def _execute(self, service: CoreService, request: dict[str, Any], context: Context, preempt: bool) -> Reply:
+        share = subsystem(service.name, **request)
         if service.check is not None:
             service.check(context, share)
         context.call.take_over(TAKEN_OVER)

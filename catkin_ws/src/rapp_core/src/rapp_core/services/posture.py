@@ -1,6 +1,8 @@
 """rapp_take_predefined_posture and rapp_rest: takePredefinedPosture and rest of the deliverable (section 4.5.2)."""
 
+import logging
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,6 +13,7 @@ from rapp_core.services.context import Context, request
 from rapp_core.services.joints import share_of_speed
 from rapp_core.services.moving import POSTURE, motion
 
+_log = logging.getLogger(__name__)
 RESTING = ("Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
 
 
@@ -81,4 +84,33 @@ def rest_machine(context: Context) -> Machine:
         "check",
         [Edge("check", "take"), Edge("take", "relax")],
         ["relax"],
+    )
+
+
+def back_machine(context: Context) -> Machine:
+    """Sub-FSM after a RApp: take a posture, switch the motors off; let the robot rest when there is none, or it cannot take it."""
+    rest, robot = rest_machine(context), context.robot.motion
+
+    def release(share: Subsystem) -> Movement:
+        context.check()  # whoever has ended the way back is not to be made to rest
+        error = share.memory.get("error")
+        if isinstance(error, Exception):
+            _log.warning("the robot rests out of posture %s: %s", request(share, "posture"), error)
+        context.trace.call("core", "ALMotion", "rest")
+        return robot.release()
+
+    def rested(share: Subsystem) -> None:
+        share.memory.pop("error", None)
+
+    return Machine(
+        "rapp_rest",
+        {**rest.states, "release": replace(motion(context, "release", release, "rest"), on_leave=rested)},
+        "check",
+        [
+            Edge("check", "take", lambda share: bool(request(share, "posture")), "a posture"),
+            Edge("check", "release"),
+            Edge("take", "relax"),
+        ],
+        ["relax", "release"],
+        failure="release",
     )

@@ -74,3 +74,5 @@ CORE_SERVICES = (
     CoreService("rapp_set_camera_params", "SetCameraParams", picture.params_machine, ("cameras",), "vision.set_camera_params"),
 )  # fmt: skip
 """All services of the core agent that use the robot. Calls that leave the robot are in `services.outside`."""
+PUT_BACK = CoreService("rapp_rest", "Rest", posture.back_machine, BODY, "navigation.rest")
+"""The core agent's own, after a RApp that has moved the robot."""
