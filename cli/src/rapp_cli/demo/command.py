@@ -8,6 +8,7 @@ from typing import Any
 from rapp_cli.demo.config import HAZARD, SHOW_AROUND, VOICE_MAIL, DemoConfig, add_options, read
 from rapp_cli.demo.hazard import Hazard
 from rapp_cli.demo.show_around import ShowAround
+from rapp_cli.demo.speech import check_speech
 from rapp_cli.demo.story import Story
 from rapp_cli.demo.system import System, running_system
 from rapp_cli.demo.voice_mail import VoiceMail
@@ -28,6 +29,8 @@ STORIES: dict[str, Callable[[DemoConfig, System], Story]] = {
 def run(options: argparse.Namespace) -> int:
     """Run the demo; 0 only when the story has ended well."""
     config = read(options)
+    if config.robot is None:
+        check_speech(config)
     return asyncio.run(interruptible(_demo(config), "demo"))
 
 
