@@ -4,6 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from rapp_bridge.blocking import Blocking
@@ -13,8 +14,10 @@ from rapp_bridge.encoding import encode_arguments
 from rapp_bridge.errors import BridgeError, Invalid, Refused, Unreachable
 from rapp_bridge.forms import JSON, Piece, json_pieces
 from rapp_bridge.links import Outgoing
-from rapp_bridge.master import Master
+from rapp_bridge.master import Master, Unregistered
 from rapp_bridge.rostypes import service_class
+
+PAUSE = 0.5  # s until another connection is tried when one could not be opened, and others are
 
 Outcome = list[Piece] | BridgeError
 """The JSON of a response's fields, or why there is none."""
@@ -103,6 +106,8 @@ class _Line:
     waiting: deque[_Call] = field(default_factory=deque)
     opened: set[_Connection] = field(default_factory=set)
     opening: asyncio.Task[None] | None = None
+    more: Callable[[], object] = lambda: None
+    """Opens another connection when calls wait."""
 
     def free(self, connection: _Connection) -> None:
         """The connection can take the next call."""
@@ -128,6 +133,7 @@ class _Line:
         self.opened.discard(connection)
         if connection in self.idle:
             self.idle.remove(connection)
+        self.more()
 
 
 class Calls:
@@ -145,12 +151,13 @@ class Calls:
         line = self._lines.get(name)
         if line is None:
             line = self._lines[name] = _Line(self._config.connection_age)
+            line.more = partial(self._open_more, name, line)
         call = _Call(args, done)
         call.timer = asyncio.get_running_loop().call_later(seconds, self._late, name, call, seconds)
         connection = line.take()
         if connection is None:
             line.waiting.append(call)
-            self._open_more(name, line)
+            line.more()
         elif not connection.begin(call):
             line.free(connection)
 
@@ -167,6 +174,7 @@ class Calls:
     def close(self) -> None:
         """Close all connections."""
         for line in self._lines.values():
+            line.waiting.clear()
             if line.opening is not None:
                 line.opening.cancel()
             for connection in list(line.opened):
@@ -174,31 +182,35 @@ class Calls:
 
     def _late(self, name: str, call: _Call, seconds: float) -> None:
         call.settle(Unreachable(f"cannot wait longer for {name}: no answer in {seconds:g} s"))
-        line = self._lines.get(name)
-        for connection in list(line.opened) if line is not None else ():
+        line = self._lines[name]  # it is there as long as one of its calls
+        if call in line.waiting:
+            line.waiting.remove(call)
+        for connection in list(line.opened):
             if connection.has(call):
                 connection.link.close()  # its answer would be taken for that of the next call
 
     def _open_more(self, name: str, line: _Line) -> None:
-        if line.opening is None and len(line.opened) < self._config.connections:
+        if line.waiting and line.opening is None and len(line.opened) < self._config.connections:
             line.opening = asyncio.get_running_loop().create_task(self._open(name, line))
-            line.opening.add_done_callback(lambda _: self._opened(name, line))
+            line.opening.add_done_callback(lambda _: self._opened(line))
 
-    def _opened(self, name: str, line: _Line) -> None:
+    @staticmethod
+    def _opened(line: _Line) -> None:
         line.opening = None
-        if line.waiting:
-            self._open_more(name, line)
+        line.more()
 
     async def _open(self, name: str, line: _Line) -> None:
-        """Open one connection; when that fails, so do the calls that have no other to wait for."""
+        """Open one connection; when that fails, so do the calls that wait, unless another may still become free for them."""
         try:
             connection = await self._connected(name, line)
         except BridgeError as error:
-            if not line.opened:
-                calls = list(line.waiting)
-                line.waiting.clear()
-                for call in calls:
-                    call.settle(error)
+            if line.opened and not isinstance(error, Unregistered):
+                await asyncio.sleep(PAUSE)
+                return
+            calls = list(line.waiting)
+            line.waiting.clear()
+            for call in calls:
+                call.settle(error)
             return
         line.opened.add(connection)
         line.free(connection)

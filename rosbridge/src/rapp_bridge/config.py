@@ -55,6 +55,7 @@ def read(words: Sequence[str], env: Mapping[str, str]) -> Config:
     )
     for name, kind, text in (
         ("call-timeout", _positive, "seconds until a service call fails"),
+        ("connection-age", _positive, "seconds that a connection to a ROS service is kept"),
         ("queue-limit", int, "bytes that may wait for one client"),
         ("frame-limit", int, "bytes of one message from a client"),
         ("frame-rate", int, "messages a client may send in a second"),

@@ -12,6 +12,10 @@ Entries = list[tuple[str, list[str]]]
 """Names and their nodes."""
 
 
+class Unregistered(Unreachable):
+    """The master knows no such service."""
+
+
 class Master:
     """The ROS master. Its methods block, from any thread, up to `timeout` seconds, and raise Unreachable after that."""
 
@@ -21,11 +25,11 @@ class Master:
         self._timeout = timeout
 
     def service_address(self, name: str) -> tuple[str, int]:
-        """Where a service listens; raises Unreachable when none of that name is registered."""
+        """Where a service listens; raises Unregistered when none of that name is."""
         code, _, uri = self._ask("lookupService", name)
         parts = urlsplit(str(uri))
         if code != 1 or parts.hostname is None or parts.port is None:
-            raise Unreachable(f"cannot call {name}: no such service is registered; start its node")
+            raise Unregistered(f"cannot call {name}: no such service is registered; start its node")
         return parts.hostname, parts.port
 
     def topic_type(self, name: str) -> str | None:

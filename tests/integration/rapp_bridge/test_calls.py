@@ -1,8 +1,10 @@
 """Calls of ROS services by clients."""
 
 import asyncio
+from typing import Any
 
-from fakes.bridge_neighbours import Clients, node
+from fakes.bridge_neighbours import Clients, Socket, node
+from fakes.bridge_puppet import Puppet, puppet
 
 
 def test_one_slow_call_of_a_client_delays_none_of_its_fifty_others(clients: Clients) -> None:
@@ -108,3 +110,72 @@ def test_a_caller_that_leaves_harms_nobody(clients: Clients) -> None:
             assert (await staying.call("/say", args=["fine"]))["values"]["message"] == "fine"
 
     asyncio.run(story())
+
+
+SLOW = 0.5  # s
+CROWD = 70  # more than the connections to one service
+
+
+async def answers(socket: Socket, count: int) -> dict[str, str]:
+    """What calls have come to: the message, or the error."""
+    found = [await socket.receive("service_response") for _ in range(count)]
+    return {each["id"]: each["values"]["message"] if each["result"] else each["values"] for each in found}
+
+
+def test_more_calls_than_connections_are_all_answered_though_connections_grow_old(start: Any, own_master: Any) -> None:
+    async def story(clients: Clients) -> None:
+        async with clients:
+            socket = await clients.new()
+            for number in range(CROWD):
+                await socket.send(op="call_service", id=str(number), service="/slow")
+            assert await answers(socket, CROWD) == {str(number): "slow" for number in range(CROWD)}
+
+    with puppet(own_master.env, "slow") as slow:
+        slow.do(f"rospy.Service('/slow', Trigger, lambda _: time.sleep({SLOW}) or TriggerResponse(True, 'slow'))")
+        bridge = start("rapp_bridge", "--port", "0", "--call-timeout", "30", "--connection-age", str(SLOW / 2), env=own_master.env)
+        asyncio.run(story(Clients(f"ws://127.0.0.1:{bridge.ready['port']}")))
+
+
+def test_calls_that_wait_for_a_connection_are_told_when_the_node_dies(clients: Clients, ros_env: dict[str, str]) -> None:
+    async def story(stuck: Puppet) -> None:
+        async with clients:
+            socket = await clients.new()
+            for number in range(CROWD):
+                await socket.send(op="call_service", id=str(number), service="/stuck")
+            while stuck.do("len(asked)") < 64:
+                await asyncio.sleep(0.05)
+            stuck.process.kill()
+            texts = (await answers(socket, CROWD)).values()
+            assert not any("cannot wait longer" in text for text in texts)
+            assert sum("its node closed" in text for text in texts) == 64
+
+    with puppet(ros_env, "stuck") as node:
+        node.do(STUCK)
+        asyncio.run(story(node))
+
+
+def test_calls_that_wait_are_told_when_the_service_is_withdrawn(clients: Clients, ros_env: dict[str, str]) -> None:
+    async def story(stuck: Puppet) -> None:
+        async with clients:
+            socket = await clients.new()
+            await socket.send(op="call_service", id="first", service="/stuck")
+            while stuck.do("len(asked)") < 1:
+                await asyncio.sleep(0.05)
+            stuck.do("service.shutdown()")
+            assert "no such service" in (await socket.call("/stuck", id="second"))["values"]
+            stuck.do("gate.set()")
+            assert (await socket.receive("service_response"))["values"]["message"] == "free"
+
+    with puppet(ros_env, "stuck") as node:
+        node.do(STUCK)
+        asyncio.run(story(node))
+
+
+STUCK = """
+asked, gate = [], threading.Event()
+def stick(request):
+    asked.append(1)
+    gate.wait(60)
+    return TriggerResponse(True, "free")
+service = rospy.Service("/stuck", Trigger, stick)
+"""
