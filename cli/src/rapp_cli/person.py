@@ -52,23 +52,23 @@ class Person:
             self._heard.get_nowait()
 
     async def say(self, text: str) -> None:
-        """Say a text; returns when it has been spoken."""
-        assert self._world is not None
+        """Say a text; returns when it has been spoken. Raises CommandError, for a voice that is not there too."""
         self._on_speech(text)
-        world, voice = self._world, self._voice
-        await asyncio.to_thread(lambda: world.personSay(text, voice, _async=True).value(CALL_TIMEOUT))
+        await self.ask_room("personSay", text, self._voice)
 
     async def play(self, recording: Path) -> None:
-        """Say what is in a recording; returns when it has been played."""
-        assert self._world is not None
-        world = self._world
-        await asyncio.to_thread(lambda: world.personPlay(str(recording), _async=True).value(CALL_TIMEOUT))
+        """Say what is in a recording; returns when it has been played. Raises CommandError."""
+        await self.ask_room("personPlay", str(recording))
 
     async def ask_room(self, method: str, *values: Any) -> Any:
-        """Call a method of SimWorld, such as getRobotPose; gives its result."""
+        """Call a method of SimWorld, such as getRobotPose; gives its result. Raises CommandError."""
         assert self._world is not None
         world = self._world
-        return await asyncio.to_thread(lambda: getattr(world, method)(*values, _async=True).value(CALL_TIMEOUT))
+        try:
+            return await asyncio.to_thread(lambda: getattr(world, method)(*values, _async=True).value(CALL_TIMEOUT))
+        except RuntimeError as error:
+            why = " ".join(str(error).split())
+            raise CommandError(f"cannot go on in the simulated room at {self._robot}: {why}; its log says more") from error
 
     async def leave(self) -> None:
         """Go: the robot is heard no longer."""
