@@ -883,6 +883,14 @@ def test_when_an_update_cannot_be_installed_the_version_that_is_here_runs(home: 
     assert home.fake.said() == []
 
 
+def test_when_an_update_is_broken_the_robot_says_so_and_the_version_that_is_here_runs(home: Home) -> None:
+    update(home)
+    home.link.errors["install"] = Invalid("cannot unpack clock: the archive is damaged")
+    assert home.round() == KEYWORD
+    assert "activate 1.0.0" in home.fake.journal
+    assert home.fake.said() == ["The new version cannot be used, I take the one before"]
+
+
 def test_when_an_update_is_not_to_be_trusted_nothing_runs(home: Home) -> None:
     error = Invalid("cannot trust the store")
     error.reason = "rollback"

@@ -13,7 +13,7 @@ from rapp_core.control.question import which
 from rapp_core.control.refusals import not_activated, not_installed, not_interpreted, not_started
 from rapp_core.control.stopping import Stopping
 from rapp_core.control.trial import Trial
-from rapp_core.control.words import NONE_OF_THEM, NOT_UNDERSTOOD, READY, READY_ALONE, STOPPED
+from rapp_core.control.words import NONE_OF_THEM, NOT_UNDERSTOOD, READY, READY_ALONE, STOPPED, UNUSABLE
 from rapp_core.errors import Bug, CoreError, Invalid, Refused, Unreachable
 from rapp_core.ports import Agent
 
@@ -145,9 +145,12 @@ class Control:
             share.memory["package"] = Path(answer["path"])
         except CoreError as error:
             known = parts.platform.rapps().get(name)
-            if isinstance(error, Unreachable | Refused) and known is not None and known.path is not None:
+            broken = isinstance(error, Invalid) and not error.reason  # a reason names an attack, or a revoked key
+            if (broken or isinstance(error, Unreachable | Refused)) and known is not None and known.path is not None:
                 _log.warning("%s; %s %s runs", error, name, known.version)
                 share.memory["package"] = known.path
+                if broken and not self._stopping.given():
+                    self._say(UNUSABLE)
             else:
                 self._problem(share, not_installed(name, error), error)
 

@@ -4,6 +4,7 @@ READY = "I am ready"
 STOPPED = "You have stopped it"
 READY_ALONE = "I am ready, but I cannot reach the platform"
 NOT_UNDERSTOOD = "I did not understand you"
+UNUSABLE = "The new version cannot be used, I take the one before"
 NONE_OF_THEM = "All right, I do nothing"
 
 STOP = {
