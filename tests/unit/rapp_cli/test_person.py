@@ -25,9 +25,9 @@ class Refusing:
         return value if name == "value" else method
 
 
-@pytest.mark.parametrize("act", ["say", "play", "ask_room"])
-def test_what_the_room_refuses_is_told_in_a_line(act: str) -> None:
+@pytest.mark.parametrize(("act", "value"), [("say", "hello"), ("play", Path("hello.wav")), ("ask_room", "getDoor")])
+def test_what_the_room_refuses_is_told_in_a_line(act: str, value: Any) -> None:
     person = Person(ROOM, "nonsense")
     person._world = Refusing()
     with pytest.raises(CommandError, match=f"cannot go on in the simulated room at {ROOM}: .* cannot speak: espeak-ng failed;"):
-        asyncio.run(getattr(person, act)(Path("getDoor")))
+        asyncio.run(getattr(person, act)(value))
