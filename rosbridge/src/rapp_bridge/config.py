@@ -31,7 +31,7 @@ class Config:
     frame_limit: int = 16 << 20  # bytes of one incoming message
     frame_rate: int = 200_000  # messages a client may send in a second; one that sends more is disconnected
     fragment_timeout: float = 60.0  # s until a message of which parts are missing is forgotten
-    queue_limit: int = 16 << 20  # bytes waiting for one client; topics lose their oldest first, then it is disconnected
+    queue_limit: int = 16 << 20  # bytes waiting for one client, or node; topics lose their oldest first, then a client is cut off
     linger: float = 10.0  # s that publishers and subscribers outlive their last client, for pages that are reloaded
     master_timeout: float = 5.0  # s, of one question to the ROS master
     probe_timeout: float = 1.0  # s, of one question to a node; a dead one delays no answer longer

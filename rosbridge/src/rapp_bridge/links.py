@@ -98,19 +98,39 @@ class Outgoing(asyncio.BufferedProtocol):
 class SubscriberLink(asyncio.Protocol):
     """A ROS subscriber of a topic that clients publish; it loses its oldest messages when it reads too slowly."""
 
-    def __init__(self, transport: Any, queue_size: int, lost: Callable[["SubscriberLink"], object]) -> None:
+    def __init__(
+        self, transport: Any, queue_size: int, limit: int, lost: Callable[["SubscriberLink"], object], dropped: Callable[[], object]
+    ) -> None:
+        """At most `queue_size` messages and `limit` bytes wait; `dropped` is told when the bytes are too many."""
         self._transport = transport
-        self._waiting: deque[bytes] = deque(maxlen=queue_size)
+        self._queue_size = queue_size
+        self._limit = limit
+        self._waiting: deque[bytes] = deque()
+        self._size = 0  # bytes of what waits
         self._is_paused = False
         self._lost = lost
+        self._dropped = dropped
         transport.set_write_buffer_limits(HIGH_WATER)
 
     def send(self, framed: bytes) -> None:
         """Send a message with its length in front."""
         if self._is_paused:
-            self._waiting.append(framed)
+            self._keep(framed)
         else:
             self._transport.write(framed)
+
+    def _keep(self, framed: bytes) -> None:
+        self._waiting.append(framed)
+        self._size += len(framed)
+        while len(self._waiting) > self._queue_size or (self._size > self._limit and len(self._waiting) > 1):
+            if len(self._waiting) <= self._queue_size:
+                self._dropped()
+            self._take()
+
+    def _take(self) -> bytes:
+        framed = self._waiting.popleft()
+        self._size -= len(framed)
+        return framed
 
     def data_received(self, data: bytes) -> None:
         """Subscribers say nothing after their header."""
@@ -123,7 +143,7 @@ class SubscriberLink(asyncio.Protocol):
         """It has caught up."""
         self._is_paused = False
         while self._waiting and not self._is_paused:
-            self._transport.write(self._waiting.popleft())
+            self._transport.write(self._take())
 
     def connection_lost(self, _error: Exception | None) -> None:
         """It is gone."""

@@ -27,6 +27,7 @@ from rapp_bridge.topics import registered, topic_type
 OPENING = 1.0  # s after the first advertisement in which messages are kept for subscribers that are still to connect
 AWAITED = 10.0  # s in which they are kept for subscribers that were there before
 OPENING_KEPT = 32  # messages, at most, that are kept meanwhile
+WARNED_AGAIN = 1.0  # s between warnings about messages that are lost
 
 
 @dataclass(eq=False)
@@ -46,6 +47,7 @@ class _Published:
     opened: float = field(default_factory=time.monotonic)
     unused_since: float = field(default_factory=time.monotonic)
     sequence: int = 0
+    warned: float = float("-inf")
 
     def __post_init__(self) -> None:
         self.kept: deque[bytes] = deque(maxlen=1 if self.latch else min(self.queue_size, OPENING_KEPT))
@@ -76,6 +78,14 @@ class _Published:
     def is_opening(self) -> bool:
         return time.monotonic() < self.opened + (AWAITED if self.awaited else OPENING)
 
+    def warn(self, text: str) -> None:
+        """Tell those who publish here that messages are lost, now and then."""
+        now = time.monotonic()
+        if now - self.warned > WARNED_AGAIN:
+            self.warned = now
+            for client in {client for client, _ in self.clients}:
+                client.tell("warning", f"cannot keep the messages of {self.name} {text}")
+
     def welcome(self, link: SubscriberLink, caller: str) -> None:
         """Send a new subscriber what was kept for it."""
         if self.latch or self.is_opening:
@@ -89,6 +99,7 @@ class Publications:
 
     def __init__(self, config: Config, master: Master, blocking: Blocking) -> None:
         self._linger = config.linger
+        self._queue_limit = config.queue_limit
         self._master = master
         self._blocking = blocking
         self._change = asyncio.Lock()
@@ -177,8 +188,14 @@ class Publications:
             raise Invalid(f"cannot serve {name} as {header.get('type', 'that type')}: it is {cls._type}, md5sum {cls._md5sum}")
         if header.get("type", "*") not in ("*", cls._type):
             raise Invalid(f"cannot serve {name} as {header['type']}: it is {cls._type}")
-        link = SubscriberLink(transport, entry.queue_size, lambda gone: self._lost(entry, gone))
         caller = header.get("callerid", "")
+        link = SubscriberLink(
+            transport,
+            entry.queue_size,
+            self._queue_limit,
+            lambda gone: self._lost(entry, gone),
+            lambda: entry.warn(f"for {caller}: it reads too slowly; the oldest are dropped"),
+        )
         ours = {
             "topic": name, "type": cls._type, "md5sum": cls._md5sum, "message_definition": cls._full_text,
             "latching": str(int(entry.latch)), "callerid": rospy.get_name(),

@@ -21,7 +21,7 @@ from rapp_bridge.session import Session
 from rapp_bridge.websocket import CLOSE, FAILED, NORMAL, PING, POLICY, PONG, TOO_BIG, Reader, Received, ViolationError, frame
 
 TURN = 0.002  # s that one client's messages are served before others get their turn
-BACKLOG = 1024  # messages read ahead of those that are served
+BACKLOG = 1024  # messages read ahead of those that are served; their bytes are bounded as one message's
 
 _log = logging.getLogger(__name__)
 
@@ -70,6 +70,7 @@ class Connection(asyncio.Protocol):
         self._sender = Sender(transport, config.queue_limit, hall.background, self.tell, self.close)
         self._reader = Reader(config.frame_limit)
         self._received: deque[Received] = deque()
+        self._unserved = 0  # bytes that have come since all messages were served
         self._busy = self._turn_is_set = self._over = self._gone = False
         self._second, self._count = 0.0, 0  # of the rate limit
         self._heard = True
@@ -94,6 +95,7 @@ class Connection(asyncio.Protocol):
             self.close(error.code, str(error))
             return
         self._received.extend(received)
+        self._unserved += len(data)
         self._serve()
 
     def eof_received(self) -> bool:
@@ -194,8 +196,10 @@ class Connection(asyncio.Protocol):
                 self._take_turn_later()
                 break
             self._take(self._received.popleft())
+        if not self._received:
+            self._unserved = 0
         if not self._over:
-            self._read_on(len(self._received) < BACKLOG)
+            self._read_on(len(self._received) < BACKLOG and self._unserved <= self._hall.config.frame_limit)
 
     def _take_turn_later(self) -> None:
         if not self._turn_is_set:

@@ -1,12 +1,14 @@
 """What one client may have and do at once: more is answered with what the limit is, and others are served."""
 
 import asyncio
+import signal
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from fakes.bridge_neighbours import PATIENCE, Peer
+from fakes.bridge_puppet import Puppet, puppet
 from fakes.bridge_wire import BINARY, TurnedAwayError, Wire, framed
 
 NAMES, CALLS, REQUESTS, CLIENTS, RATE, QUEUE, FRAME = 5, 8, 3, 12, 3000, 300_000, 50_000
@@ -206,6 +208,58 @@ def test_topic_messages_that_wait_are_the_newest_and_the_client_may_know(url: st
         assert warned
         slow.leave()
         speaker.leave()
+
+    asyncio.run(story())
+
+
+def test_bytes_that_wait_for_a_node_that_stands_still(url: str, ros_env: dict[str, str]) -> None:
+    """However many messages its publisher would keep."""
+
+    async def story(still: Puppet) -> None:
+        wire = await Wire.open(url)
+        wire.send(op="set_level", level="warning")
+        wire.send(op="advertise", topic="/still", type="std_msgs/String", queue_size=1_000_000)
+        await wire.settle()
+        while not still.do("subscriber.get_num_connections()"):
+            await asyncio.sleep(0.02)
+        still.process.send_signal(signal.SIGSTOP)
+        for number in range(1000):  # more than the system keeps
+            wire.send(op="publish", topic="/still", msg={"data": f"{number} " + "x" * (FRAME // 2)})
+        assert "messages of /still for /still: it reads too slowly" in (await wire.receive("status"))["msg"]
+        await wire.settle()
+        still.process.send_signal(signal.SIGCONT)
+        while still.do("heard[-1:]") != ["999"]:
+            await asyncio.sleep(0.02)
+        assert still.do("heard[0]") == "0"
+        assert still.do("len(heard)") < 1000
+        wire.leave()
+
+    with puppet(ros_env, "still") as node:
+        node.do("heard = []")
+        node.do("subscriber = rospy.Subscriber('/still', String, lambda m: heard.append(m.data.split()[0]))")
+        asyncio.run(story(node))
+
+
+def test_bytes_of_messages_that_wait_for_the_ros_master(start: Any, own_master: Any) -> None:
+    """They are not lost: the client is not read from until there is room again."""
+    bridge = start("rapp_bridge", "--port", "0", "--frame-limit", str(20 * FRAME), env=own_master.env)
+
+    async def story() -> None:
+        wire = await Wire.open(f"ws://127.0.0.1:{bridge.ready['port']}")
+        transport: Any = wire.writer.transport
+        own_master.signal(signal.SIGSTOP)
+        wire.send(op="advertise", topic="/waiting", type="std_msgs/String")
+        for _ in range(1000):
+            wire.send(op="publish", topic="/waiting", msg={"data": "x" * FRAME})
+        left = [0]
+        while not left[:-1] or left[-1] != left[-2]:
+            await asyncio.sleep(0.5)
+            left.append(transport.get_write_buffer_size())
+        assert left[-1] > 500 * FRAME, "50 MB were sent, of which 1 MB may wait beside what the system keeps"
+        own_master.signal(signal.SIGCONT)
+        await wire.settle()
+        assert transport.get_write_buffer_size() == 0
+        wire.leave()
 
     asyncio.run(story())
 
