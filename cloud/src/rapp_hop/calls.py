@@ -20,6 +20,7 @@ from rapp_hop.repeats import Repeats
 from rapp_hop.results import ANY_TYPE, File, Stream
 from rapp_hop.runner import Runner
 from rapp_hop.service import Request, Service
+from rapp_hop.spool import bad_disk
 
 _log = logging.getLogger(__name__)
 
@@ -95,11 +96,14 @@ class ServiceJob:
         else:
             names = {upload.parameter: secrets.token_hex(8) + upload.suffix for upload in call.uploads}
             item.bind(call.arguments, {name: Path(file) for name, file in names.items()}, request)  # before a byte is written
-            self._folder = await asyncio.to_thread(_make_folder, house.uploads)
-            files = {name: Path(self._folder.name, file) for name, file in names.items()}
+            try:
+                self._folder = await asyncio.to_thread(_make_folder, house.uploads)
+                files = {name: Path(self._folder.name, file) for name, file in names.items()}
+                for upload in call.uploads:
+                    await asyncio.to_thread(files[upload.parameter].write_bytes, upload.data)
+            except OSError as error:
+                raise bad_disk(error) from None
             arguments = item.bind(call.arguments, files, request)
-            for upload in call.uploads:
-                await asyncio.to_thread(files[upload.parameter].write_bytes, upload.data)
         house.registry.spend(item)
         return await house.runner.run(item, arguments)
 

@@ -20,6 +20,8 @@ from rapp_hop.streams import PatientStream, PatientTlsStream
 
 _log = logging.getLogger(__name__)
 GRACE = 0.25  # seconds for a body that is not wanted
+LINGER = 10.0  # seconds for what still comes of it when it has been answered
+LINGER_BYTES = 64 * 2**20
 
 
 class Site(Protocol):
@@ -60,6 +62,8 @@ class Message(HTTPMessageDelegate):
         self._version = "1.1"
         self._task: asyncio.Task[None] | None = None
         self._whole = False
+        self._unwanted = 0  # bytes of the body that were dropped
+        self._over: asyncio.Event | None = None  # nothing more is to be waited for
         stream.expect(self._loop.time())
 
     def headers_received(
@@ -86,11 +90,14 @@ class Message(HTTPMessageDelegate):
         else:
             self._job = found
         self._expect_body(head)
-        return self._task
+        return self._task if "expect" in head.headers else None
 
     def data_received(self, chunk: bytes) -> "asyncio.Future[None] | None":
         """Keep a piece of the body; nothing more is read while it goes to the disk."""
         if self._answer is not None or self._job is None:
+            self._unwanted += len(chunk)
+            if self._unwanted > LINGER_BYTES:
+                self._end_lingering()
             return None
         if self._body is None:
             self._body = self._site.spool()
@@ -104,12 +111,14 @@ class Message(HTTPMessageDelegate):
         """The request is whole."""
         self._whole = True
         self.deadline = None
+        self._end_lingering()
         if self._task is None:
             self._task = self._loop.create_task(self._serve())
             self._site.running(self, True)
 
     def on_connection_close(self) -> None:
         """The peer has gone, or broken the rules, before the request was whole."""
+        self._end_lingering()
         if self._task is None:
             self._end()
 
@@ -156,6 +165,7 @@ class Message(HTTPMessageDelegate):
             if answer is not None and not self.stream.closed():
                 without_body = self._head is not None and self._head.method == "HEAD"
                 await send(self.stream, answer, self._keep, without_body, self._version, self._site.send_timeout)
+                await self._linger()
                 self._line.finish()
                 if not self._keep:
                     self.stream.close()
@@ -169,6 +179,23 @@ class Message(HTTPMessageDelegate):
             if self._job is not None:
                 await self._job.done()
             self._site.running(self, False)
+
+    async def _linger(self) -> None:
+        """Drop what still comes, for a while: closed at once, the connection is reset, and the answer with it."""
+        if self._whole or self._head is None or "expect" in self._head.headers or self.stream.closed():
+            return
+        self._end()
+        self._over = asyncio.Event()
+        self.stream.finish_writing()
+        try:
+            async with asyncio.timeout(LINGER):
+                await self._over.wait()
+        except TimeoutError:
+            pass
+
+    def _end_lingering(self) -> None:
+        if self._over is not None:
+            self._over.set()
 
     async def _answer_of(self, job: Job) -> WireAnswer:
         try:

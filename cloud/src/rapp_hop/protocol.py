@@ -100,6 +100,13 @@ TURNED_AWAY = "turned away"
 """`HopError.reason` of a call that was not begun."""
 
 
+def turned_away(message: str) -> Unreachable:
+    """Return the error of a call that was not begun and may safely come again."""
+    error = Unreachable(message, 503)
+    error.reason = TURNED_AWAY
+    return error
+
+
 def suffix_of(file_name: str) -> str:
     """Return of a sender's file name what may be kept: a short plain suffix, or nothing."""
     dot = file_name.rpartition(".")

@@ -1,13 +1,14 @@
 """A request's body while it comes: a little in memory, what is longer in a file of its own."""
 
 import asyncio
+import contextlib
 import tempfile
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import IO
 
-from rapp_hop.errors import HopError, Unreachable
-from rapp_hop.protocol import TURNED_AWAY, Body
+from rapp_hop.errors import HopError
+from rapp_hop.protocol import Body, turned_away
 
 IN_MEMORY = 256 * 1024  # bytes
 
@@ -37,8 +38,9 @@ class Spool:
         """Take one piece."""
         self.length += len(piece)
         if self._problem is None and len(piece) > self._room.left:
-            self._give_up("cannot take this request now: the server holds too many long ones, try again later")
+            self._problem = turned_away("cannot take this request now: the server holds too many long ones, try again later")
         if self._problem is not None:
+            self.drop()
             return
         self._room.left -= len(piece)
         self._held += len(piece)
@@ -55,16 +57,17 @@ class Spool:
     async def whole(self) -> Body:
         """Return the body.
 
-        :raises Unreachable: when there was no room for it
-        :raises OSError: when the disk took it not
+        :raises Unreachable: when there was no room for it, or the disk took it not
         """
         if self._writing is not None:
             await self._writing
+        found: Body = bytes(self._buffer)
+        if self._problem is None and self._file is not None:
+            found = await asyncio.to_thread(self._mapped, self._file)
         if self._problem is not None:
+            self.drop()
             raise self._problem
-        if self._file is None:
-            return bytes(self._buffer)
-        return await asyncio.to_thread(self._mapped)
+        return found
 
     def drop(self) -> None:
         """Let go of all."""
@@ -72,21 +75,28 @@ class Spool:
         self._held = 0
         self._buffer = bytearray()
         if self._file is not None and (self._writing is None or self._writing.done()):
-            self._file.close()
-
-    def _give_up(self, why: str) -> None:
-        self._problem = Unreachable(why, 503)
-        self._problem.reason = TURNED_AWAY
-        self.drop()
+            with contextlib.suppress(OSError):  # of what it could not write before
+                self._file.close()
 
     def _write(self, data: bytearray) -> None:
-        if self._file is None:
-            self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            self._file = tempfile.TemporaryFile(dir=self._folder)  # noqa: SIM115 (closed by drop)
-        self._file.write(data)
+        try:
+            if self._file is None:
+                self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+                self._file = tempfile.TemporaryFile(dir=self._folder)  # noqa: SIM115 (closed by drop)
+            self._file.write(data)
+        except OSError as error:
+            self._problem = bad_disk(error)
 
-    def _mapped(self) -> mmap:
-        assert self._file is not None
-        self._file.write(self._buffer)
-        self._file.flush()
-        return mmap(self._file.fileno(), 0, access=ACCESS_READ)
+    def _mapped(self, file: IO[bytes]) -> Body:
+        try:
+            file.write(self._buffer)
+            file.flush()
+            return mmap(file.fileno(), 0, access=ACCESS_READ)
+        except OSError as error:
+            self._problem = bad_disk(error)
+            return b""
+
+
+def bad_disk(error: OSError) -> HopError:
+    """Return the error of a call whose body or files the disk does not take; it was not begun."""
+    return turned_away(f"cannot keep this request: {error.strerror}, see the platform's disk and try again later")

@@ -5,6 +5,7 @@ kept in mind, and the next read finds it. What Tornado ends without a word, or w
 """
 
 import asyncio
+import contextlib
 import socket
 import ssl
 from collections.abc import Callable
@@ -50,6 +51,11 @@ class _Patient:
         future: asyncio.Future[None] = super().write(self.malformed if data == BARE_400 else data)  # type: ignore[misc]
         return future
 
+    def finish_writing(self) -> None:
+        """Tell the peer that nothing more comes; what he sends can still be read."""
+        with contextlib.suppress(OSError):  # he has gone
+            _finish_writing(self.socket)  # type: ignore[attr-defined]
+
     def close(self, exc_info: Any = False) -> None:
         """Close, so that the peer can read what was last written."""
         line: socket.socket | None = self.socket  # type: ignore[attr-defined]
@@ -75,13 +81,15 @@ class PatientTlsStream(_Patient, SSLIOStream):
 
 def _farewell(line: socket.socket, last: bytes) -> None:
     try:
-        if isinstance(line, ssl.SSLSocket):
-            return
-        if last:
+        if last and not isinstance(line, ssl.SSLSocket):
             line.send(last)
-        line.shutdown(socket.SHUT_WR)
+        _finish_writing(line)
         for _ in range(DRAIN // 65536):
-            if not line.recv(65536):
+            if not socket.socket.recv(line, 65536):
                 return
     except OSError:  # nothing more to read, or nobody there
         return
+
+
+def _finish_writing(line: socket.socket) -> None:
+    socket.socket.shutdown(line, socket.SHUT_WR)  # TLS's own would forget how to read

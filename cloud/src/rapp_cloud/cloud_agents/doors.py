@@ -9,9 +9,9 @@ import secrets
 from pathlib import Path
 
 from rapp_hop.client import CLIENTS
-from rapp_hop.errors import Refused, Unreachable
+from rapp_hop.errors import Refused
 from rapp_hop.mounts import Mount, Visit
-from rapp_hop.protocol import TURNED_AWAY, WireAnswer
+from rapp_hop.protocol import WireAnswer, turned_away
 from rapp_hop.registry import ServiceRegistry
 from rapp_hop.relay import relay
 from rapp_hop.server import HopServer, ServerLimits
@@ -47,9 +47,7 @@ class Door:
         if visit.rest not in self._services:
             raise Refused(f"cannot call {visit.rest[:70]!r}: the package does not name it under permissions.cloud", 403)
         if self._calls >= CALLS:
-            error = Unreachable(f"cannot call {visit.rest} now: {CALLS} calls of this cloud agent are open, try again later", 503)
-            error.reason = TURNED_AWAY
-            raise error
+            raise turned_away(f"cannot call {visit.rest} now: {CALLS} calls of this cloud agent are open, try again later")
         self._calls += 1
         try:
             return await relay(self._house.platform, visit.request, visit.request.path, LONGEST_CALL, self._secret)
