@@ -74,8 +74,9 @@ class VoiceMail(DynamicAgent):
         body = f"{self._sender} has recorded a voice message for you; it is attached.\n"
         try:
             sent = cloud.send_mail_wait([str(share.memory["address"])], subject, body, str(share.memory["recording"]))
-        except Refused:
-            sent = "refused"
+        except Refused as error:
+            sent = "refused" if str(error).startswith(cloud.SERVER_REFUSES) else "not taken"
+            share.memory["why"] = str(error).partition(" (")[0]  # without what is for those who mend it
         except Unreachable:
             sent = "lost"
         share.memory["sent"] = sent
@@ -86,6 +87,8 @@ class VoiceMail(DynamicAgent):
             "kept": "I cannot reach the mail server, I keep your message and send it later",
             "locked": "the mail server does not let me in, I keep your message and send it when it does",
             "refused": f"the mail server refuses your message to {share.memory['recipient']}, I cannot send it",
+            "not taken": f"I am sorry, I could not send your message: I {share.memory.get('why')}",
+            "unknown": f"I do not know whether your message to {share.memory['recipient']} is sent, it may still be sent",
             "lost": "I am sorry, I could not send your message, please try again later",
             None: "I am sorry, I do not know to whom I should write",
         }

@@ -20,6 +20,7 @@ KEPT = "I cannot reach the mail server, I keep your message and send it later"
 LOCKED = "the mail server does not let me in, I keep your message and send it when it does"
 REFUSED = "the mail server refuses your message to Elizabeth, I cannot send it"
 NOT_TAKEN = "The mail server does not take your message to elizabeth@home.example, I could not send it, and keep it"
+UNKNOWN = "I do not know whether your message to Elizabeth is sent, it may still be sent"
 PROFILE = {"name": "Maria", "language": "en", "contacts": [{"name": "Elizabeth", "address": "elizabeth@home.example"}]}
 
 
@@ -160,4 +161,19 @@ def test_the_link_killed_while_it_sends_is_asked_again_and_the_mail_comes_once(r
     robot.start("link")
     said = robot.until(lambda seen: (seen.kind, seen.detail) == ("said", SENT), since)
     robot.until_listening(robot.seen.index(said))
+    assert wait_sent(robot)
+
+
+def test_of_a_link_that_stays_away_nothing_is_promised_and_the_mail_comes_once(robot: RobotBehindFaults) -> None:
+    since, met = len(robot.seen), len(robot.mail_line.met)
+    meet(robot, Fault("CONTENT", "held"), NONE)
+    robot.ask("e-mail")
+    robot.until(entered("s32", "dynamic"), since)
+    robot.say_until("Elizabeth", entered("s33", "dynamic"), since)
+    robot.wait_for(lambda: len(robot.mail_line.met) > met)
+    robot.kill("link")
+    said = robot.until(lambda seen: (seen.kind, seen.detail) == ("said", UNKNOWN), since)
+    robot.until_listening(robot.seen.index(said))
+    assert delivered(robot) == []
+    robot.start("link")
     assert wait_sent(robot)

@@ -160,4 +160,4 @@ def _translated(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         step = "free some space" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "check the folder"
-        raise Refused(f"cannot keep mails in {folder}: {error.strerror}, {step}") from None
+        raise Refused(f"cannot keep mails: {error.strerror}, {step} ({folder})") from None

@@ -242,7 +242,8 @@ class HazardDetection(DynamicAgent):
             _log.error("%s", error)
             say(f"I could not write to {carer['name']}")
             return
-        say(f"I have written to {carer['name']}" if state == "delivered" else f"I write to {carer['name']} later")
+        words = {"delivered": "I have written to {}", "unknown": "I do not know whether my message to {} is sent"}
+        say(words.get(state, "I write to {} later").format(carer["name"]))
 
     def _written(self, name: str, picture: Image) -> Path:
         path = self._folder / f"{name}.jpg"

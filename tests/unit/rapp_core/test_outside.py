@@ -12,7 +12,7 @@ from fakes.link import FakeLink
 from fakes.rapps import write_rapp
 from rapp_core.config import Config, Limits
 from rapp_core.control.cloud_agent import CloudAgents
-from rapp_core.errors import Invalid, Refused, Unreachable
+from rapp_core.errors import NOT_KNOWN, Invalid, Refused, Unreachable
 from rapp_core.manifest import read_manifest
 from rapp_core.services.outside import CloudCall, Outside
 from rapp_core.services.sendable import CallFile
@@ -91,6 +91,17 @@ def test_a_link_that_stays_away_is_told_after_a_bound(outside: Outside, agent: F
     link.away = True
     with pytest.raises(Unreachable):
         outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
+    assert Config.link_back - 1.0 < clock.time <= Config.link_back
+
+
+def test_of_a_link_that_was_lost_on_the_way_and_stays_away_it_is_not_known_what_it_does(
+    outside: Outside, agent: FakeAgent, link: FakeLink, clock: Clock
+) -> None:
+    lost = Unreachable("cannot send_mail: the link was lost")
+    lost.reason = NOT_KNOWN
+    link.errors["send_mail"] = lost
+    clock.at(1.0, lambda: setattr(link, "away", True))
+    assert outside.send_mail(agent, ["e@home.example"], "subject", "body", "") == "unknown"
     assert Config.link_back - 1.0 < clock.time <= Config.link_back
 
 

@@ -146,7 +146,12 @@ def test_of_an_open_door_it_writes_only_if_asked(answer: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mail", "words"), [("kept", "I write to Elizabeth later"), (Refused("no such address"), "I could not write to Elizabeth")]
+    ("mail", "words"),
+    [
+        ("kept", "I write to Elizabeth later"),
+        ("unknown", "I do not know whether my message to Elizabeth is sent"),
+        (Refused("no such address"), "I could not write to Elizabeth"),
+    ],
 )
 def test_it_says_when_a_mail_is_not_sent(mail: Any, words: str) -> None:
     assert run(check=OPEN, hears=["yes"], mail=mail).said()[-1] == words

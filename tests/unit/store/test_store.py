@@ -65,12 +65,15 @@ def test_voice_mail_says_that_a_message_is_kept() -> None:
     [
         ("locked", "does not let me in, I keep"),
         (Refused("cannot deliver to elizabeth@home.example: 550"), "refuses your message to Elizabeth"),
-        (Unreachable("cannot reach the link"), "could not send"),
+        (Refused("cannot keep mails: No space left on device, free some space (/x)"), "I cannot keep mails: No space left"),
+        ("unknown", "it may still be sent"),
+        (Unreachable("cannot reach the link"), "please try again"),
     ],
 )
 def test_voice_mail_says_why_a_message_is_not_sent(mail: Any, words: str) -> None:
     core = run("voice_mail", hears=["Elizabeth"], services={"profile": PROFILE}, mail=mail)
     assert words in core.said()[-1]
+    assert "/x" not in core.said()[-1]
 
 
 @pytest.mark.parametrize("profile", [{"name": "Maria", "contacts": []}, Unreachable("cannot reach the platform")])

@@ -17,6 +17,7 @@ from rapp_api.errors import RappError, Refused
 OnResult = Callable[[Any], None]
 OnError = Callable[[RappError], None]
 
+SERVER_REFUSES = "cannot deliver to "
 MOST_OPEN = 8  # asynchronous calls at a time
 _open = threading.BoundedSemaphore(MOST_OPEN)
 _log = logging.getLogger(__name__)
@@ -63,10 +64,12 @@ def stop_agent_wait() -> bool:
 
 
 def send_mail_wait(recipients: Sequence[str], subject: str, body: str, attachment: str = "") -> str:
-    """Send a mail and wait; gives "delivered", or "kept" or "locked" when it will be sent later. Raises RappError.
+    """Send a mail and wait; gives "delivered", or "kept" or "locked" when it will be sent later, or "unknown". Raises RappError.
 
     "kept": the mail server is away or busy; "locked": it does not let the robot's account in, until somebody mends that.
-    Refused: the server does not take this mail, such as for an address it does not know.
+    "unknown": the robot's way out was lost on the way; it may be sent, or may have been.
+    Refused: the server does not take this mail, such as for an address it does not know; the text then begins with SERVER_REFUSES.
+    Any other refusal is the robot's own: it keeps too many mails, its disk is full, it has no mail account.
     `attachment` is the path of one of this run's recordings.
     """
     return current().send_mail(list(recipients), subject, body, attachment)

@@ -82,7 +82,7 @@ class CoreAgent(Protocol):
         """Have this RApp's cloud agent stopped; whether there was one."""
 
     def send_mail(self, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
-        """Send a mail; gives "delivered", "kept" or "locked" (see `rapp_api.cloud.send_mail_wait`)."""
+        """Send a mail; gives "delivered", "kept", "locked" or "unknown" (see `rapp_api.cloud.send_mail_wait`)."""
 
     def keep(self, name: str, data: bytes) -> str:
         """Keep a file beyond this run; gives where."""

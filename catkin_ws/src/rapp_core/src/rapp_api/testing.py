@@ -29,7 +29,7 @@ class FakeCoreAgent(FakeBody):
 
     `hears` are the words the person says, one for each time the robot listens ("" for silence); `services` gives for each HOP
     service its result, a function of its arguments (files are `Path`), or the RappError it ends with; `agent_services` does so for
-    the RApp's own cloud agent; `mail` is "delivered", "kept", "locked" or a RappError; `pictures` are what the cameras see, one
+    the RApp's own cloud agent; `mail` is what `send_mail_wait` gives or a RappError; `pictures` are what the cameras see, one
     after another; `walks` says how each walk ends (None: well); with `package`, the folder of the RApp, calls that its package.json
     does not name are refused.
     """

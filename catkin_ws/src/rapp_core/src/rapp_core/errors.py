@@ -2,7 +2,7 @@
 
 
 class CoreError(Exception):
-    """Root of the core agent's errors; `reason` is a word for what exactly was wrong, the link's or NO_RUNTIME, if any."""
+    """Root of the core agent's errors; `reason` is a word for what exactly was wrong, the link's or one of those below, if any."""
 
     kind = "bug"
     reason = ""
@@ -37,3 +37,6 @@ KINDS: dict[str, type[CoreError]] = {error.kind: error for error in (Refused, Un
 
 NO_RUNTIME = "no runtime"
 """Reason of a Refused: what a RApp is written in is not installed on this robot."""
+
+NOT_KNOWN = "not known"
+"""Reason of an Unreachable: the link was asked, and whether it has done it, or will, is not known."""

@@ -111,6 +111,7 @@ class Hop(Protocol):
     def request(self, name: str, arguments: Mapping[str, Any], timeout: float, cut: Callable[[], bool] = lambda: False) -> Any:
         """Ask, wait for the end of the job, give its JSON result. Raises Refused, Unreachable, Invalid, Bug.
 
+        An Unreachable whose reason is NOT_KNOWN: the link may do it all the same.
         Once `cut` holds the job is cancelled, and refused.
         """
 

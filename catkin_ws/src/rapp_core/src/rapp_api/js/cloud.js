@@ -30,7 +30,10 @@ async function stopAgent() {
   return (await core.call("rapp_stop_cloud_agent", {})).stopped;
 }
 
-/** Send a mail; gives "delivered", or "kept" or "locked" when it will be sent later. `attachment`: path of a recording of this run. */
+/**
+ * Send a mail; gives "delivered", or "kept" or "locked" when it will be sent later, or "unknown".
+ * `attachment`: path of a recording of this run.
+ */
 async function sendMail(recipients, subject, body, attachment = "") {
   return (await core.call("rapp_send_mail", { recipients, subject, body, attachment })).state;
 }

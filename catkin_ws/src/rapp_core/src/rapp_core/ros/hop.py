@@ -15,7 +15,7 @@ from rapp_msgs.srv import HopRequest
 from std_msgs.msg import String
 
 from rapp_core.control.telling import Telling
-from rapp_core.errors import KINDS, Bug, CoreError, Refused, Unreachable
+from rapp_core.errors import KINDS, NOT_KNOWN, Bug, CoreError, Refused, Unreachable
 from rapp_core.ports import Undelivered
 from rapp_core.trace import Trace
 
@@ -89,8 +89,9 @@ class RosHop:
             tell.cut()
             self._cancel.publish(job)
             raise
-        except Unreachable:
+        except Unreachable as error:
             self._cancel.publish(job)
+            error.reason = error.reason or NOT_KNOWN
             raise
         finally:
             with self._lock:

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -11,11 +12,13 @@ from typing import Any
 
 from rapp_core.config import Config
 from rapp_core.control.cloud_agent import CloudAgents
-from rapp_core.errors import Invalid, Refused, Unreachable
+from rapp_core.errors import NOT_KNOWN, Invalid, Refused, Unreachable
 from rapp_core.ports import Agent, Hop
 from rapp_core.services.sendable import CallFile, Sendable
 
 MAIL_AGAIN = 0.5  # s between tries to hand a mail to a link that is away
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ class Outside:
         return self._cloud_agents.stop(run, self._config.cloud_agent_stop)
 
     def send_mail(self, run: Agent, recipients: Sequence[str], subject: str, body: str, attachment: str) -> str:
-        """Have a mail sent (paper Fig. 12); gives "delivered", "kept" or "locked". Raises Refused, Unreachable, Invalid, Bug."""
+        """Have a mail sent (paper Fig. 12); see `rapp_api.cloud.send_mail_wait`. Raises Refused, Unreachable, Invalid, Bug."""
         self._allowed(run, "send_mail")
         if attachment and not Path(attachment).resolve().is_relative_to(run.recordings.resolve()):
             raise Refused(f"cannot attach {attachment}: only recordings of this run may leave the robot")
@@ -81,15 +84,22 @@ class Outside:
         return self._hand_over(run, mail)
 
     def _hand_over(self, run: Agent, mail: dict[str, Any]) -> str:
-        """A link that goes away meanwhile is given the mail again: it knows by the Message-ID what it has already."""
-        begun, whole = self._now(), self._config.mail_timeout
+        """A link that goes away meanwhile is given the mail again: it knows by the Message-ID what it has already.
+
+        One that does not come back may have kept it, and may still send it.
+        """
+        begun, whole, may_have_it = self._now(), self._config.mail_timeout, False
         while True:
             left = begun + whole - self._now()
             try:
                 return str(self._hop.request("send_mail", mail, left)["state"])
-            except Unreachable:
+            except Unreachable as error:
+                may_have_it = may_have_it or error.reason == NOT_KNOWN
                 late = self._now() + MAIL_AGAIN >= begun + min(self._config.link_back, whole)
                 if late or not run.alive or self._stop.wait(MAIL_AGAIN):
+                    if may_have_it:
+                        _log.warning("%s", error)
+                        return "unknown"
                     raise
 
     @staticmethod
