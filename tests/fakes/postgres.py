@@ -29,18 +29,20 @@ def _as_account(words: list[str]) -> list[str]:
 
 
 @contextmanager
-def postgres() -> Iterator[str]:
-    """Start one; gives the URL of its server, without a database."""
+def postgres(tls: tuple[Path, Path] | None = None, port: int = 5432) -> Iterator[str]:
+    """Start one; gives the URL of its server, without a database. With `tls` (certificate, key) it listens on 127.0.0.1 too."""
     with tempfile.TemporaryDirectory(prefix="rapp-pg-", dir="/tmp") as name:
         folder = Path(name)
         data = folder / "data"
         if os.geteuid() == 0:
             shutil.chown(folder, ACCOUNT, ACCOUNT)
+        line = _tls(folder, *tls) if tls else ["listen_addresses="]
         initdb = [str(_binaries() / "initdb"), "--auth=trust", "--username=rapp", "--no-sync", "--encoding=UTF8", "-D", str(data)]
         subprocess.run(_as_account(initdb), check=True, capture_output=True, timeout=PATIENCE, cwd="/")
         settings = [
             f"unix_socket_directories={folder}",
-            "listen_addresses=",
+            *line,
+            f"port={port}",
             "fsync=off",
             "max_connections=40",
             "shared_buffers=16MB",
@@ -50,7 +52,7 @@ def postgres() -> Iterator[str]:
         with log.open("wb") as errors:
             server = subprocess.Popen(_as_account(words), stdin=subprocess.DEVNULL, stdout=errors, stderr=errors, cwd="/")
         try:
-            url = f"postgresql+psycopg://rapp@/{{}}?host={folder}"
+            url = f"postgresql+psycopg://rapp@/{{}}?host={folder}&port={port}"
             _wait(server, url.format("postgres"), log)
             yield url
         finally:
@@ -74,6 +76,16 @@ def database(server: str, name: str) -> Iterator[str]:
             connection.execute(sa.text(f"DROP DATABASE {name} WITH (FORCE)"))
     finally:
         engine.dispose()
+
+
+def _tls(folder: Path, *files: Path) -> list[str]:
+    """The settings for TLS, with files that the server's account may read."""
+    for file in files:
+        copy = shutil.copy(file, folder)
+        if os.geteuid() == 0:
+            shutil.chown(copy, ACCOUNT, ACCOUNT)
+    certificate, key = (folder / file.name for file in files)
+    return ["listen_addresses=127.0.0.1", "ssl=on", f"ssl_cert_file={certificate}", f"ssl_key_file={key}"]
 
 
 def _wait(server: subprocess.Popen[bytes], url: str, log: Path) -> None:

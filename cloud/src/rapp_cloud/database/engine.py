@@ -16,6 +16,7 @@ import sqlalchemy as sa
 from sqlalchemy.exc import ArgumentError, DBAPIError, OperationalError, SQLAlchemyError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
+from rapp_cloud.database.secrecy import secrecy_of
 from rapp_hop.errors import Bug, Invalid, Refused, Unreachable
 
 FILE = "platform.sqlite"
@@ -36,6 +37,7 @@ class Database:
         :param url: as SQLAlchemy has it, such as sqlite:////data/platform.sqlite or postgresql+psycopg://rapp@host/rapp
         :param wait: seconds for a lock
         :raises Invalid: when the URL is none of these
+        :raises Refused: see `secrecy_of`
         """
         try:
             parsed = sa.make_url(url)
@@ -53,7 +55,9 @@ class Database:
             options = f"-c statement_timeout={int(_STATEMENT * 1000)} -c lock_timeout={int(wait * 1000)}"
             self._engine = sa.create_engine(
                 parsed, pool_pre_ping=True, pool_timeout=wait, hide_parameters=True,
-                connect_args={"connect_timeout": max(2, int(wait)), "options": options, "application_name": "rapp-cloud"},
+                connect_args={
+                    "connect_timeout": max(2, int(wait)), "options": options, "application_name": "rapp-cloud", **secrecy_of(parsed)
+                },
             )  # fmt: skip
         else:
             raise Invalid(f"cannot use a database of type {parsed.drivername}: there are sqlite and postgresql")
