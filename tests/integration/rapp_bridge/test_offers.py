@@ -40,7 +40,7 @@ def test_callers_of_a_provider_that_leaves_are_told_at_once(clients: Clients, pe
         async with clients:
             provider, other = await offer(clients, "/leaving"), await clients.new()
             peer.call("/leaving", "from ROS")
-            await other.send(op="call_service", service="/leaving", args=["from a client"])
+            await other.send(op="call_service", service="/leaving", args=["from a client"], timeout=3600)
             for _ in range(2):
                 await provider.receive("call_service")
             provider.leave()
