@@ -42,6 +42,11 @@ class Desk:
         self._core._hears.append(word)
         return function(*args)
 
+    def rests(self) -> tuple[str, bool]:
+        """The family of its posture, and whether its motors are on; it has none, but knows when it would need them."""
+        family = {"Sit": "Sitting", "StandInit": "Standing"}[self._core.posture]
+        return family, family == "Standing"
+
     def close(self) -> None:
         self._core.__exit__()
 
@@ -64,6 +69,11 @@ class Robot:
             self._robot.say(word)
             time.sleep(0.2)
         return listening.result(0)
+
+    def rests(self) -> tuple[str, bool]:
+        """The family of its posture, and whether any of its motors is on."""
+        call = self._robot.naoqi.call
+        return str(call("ALRobotPosture", "getPostureFamily")), any(call("ALMotion", "getStiffnesses", "Body"))
 
     def close(self) -> None:
         self._rapp.close()
@@ -224,7 +234,9 @@ def test_moves_joints(side: Side) -> None:
 def test_looks_takes_postures_and_rests(side: Side) -> None:
     side.call(navigation.take_predefined_posture, "StandInit", 1.0)
     side.call(navigation.look_at_point, 1.0, 0.3, 0.4)
+    assert side.rests() == ("Standing", True)
     side.call(navigation.rest)
+    assert side.rests() == ("Sitting", False)
     side.call(navigation.take_predefined_posture, "StandInit", 1.0)
 
 

@@ -98,7 +98,7 @@ def test_its_body_is_where_it_was_told_to_go() -> None:
         navigation.move_joint("HeadYaw", 0.5)
         navigation.look_at_point(1.0, 0.0, 0.3)
         navigation.rest()
-        assert (core.velocity, core.joints["HeadYaw"], core.posture) == ((0.0, 0.0, 0.0), 0.5, "Crouch")
+        assert (core.velocity, core.joints["HeadYaw"], core.posture) == ((0.0, 0.0, 0.0), 0.5, "Sit")
         assert navigation.get_transform("CameraTop", navigation.ROBOT).shape == (4, 4)
 
 

@@ -90,7 +90,7 @@ def test_a_safe_flat_is_said_to_be_safe_and_nobody_is_written_to() -> None:
         "everything is safe, the door is closed, and the lamp is off",
     ]
     assert core.mails == []
-    assert core.posture == "Crouch"
+    assert core.posture == "Sit"
     assert sorted(core.kept) == ["door.jpg", "lamp.jpg"]
 
 
@@ -107,7 +107,7 @@ def test_with_too_few_codes_it_says_that_it_does_not_know_where_it_is(names: tup
     core = run(find_codes=seen(*names))
     assert core.said()[-1].startswith("I do not know where I am")
     assert walks(core) == []
-    assert core.posture == "Crouch"
+    assert core.posture == "Sit"
 
 
 def test_a_code_that_was_missed_is_looked_for_again() -> None:
@@ -186,7 +186,7 @@ def test_an_obstacle_is_told_and_it_looks_from_where_it_is() -> None:
     core = run(walks=[OBSTACLE])
     assert core.said()[1:3] == ["I go to the door", "something is in my way, I cannot get to the door, I look from here"]
     assert core.said()[-1].startswith("everything is safe")
-    assert core.posture == "Crouch"
+    assert core.posture == "Sit"
 
 
 @pytest.mark.parametrize("error", [AWAY, Refused("cannot call the cloud agent: it has ended"), Invalid("not JSON")])
@@ -194,7 +194,7 @@ def test_it_says_when_its_cloud_agent_is_away(error: Exception) -> None:
     words = "I cannot reach my cloud agent, so I cannot tell whether everything is safe"
     for core in (run(find_codes=error), run(check=error)):
         assert core.said()[-1] == words
-        assert core.posture == "Crouch"
+        assert core.posture == "Sit"
 
 
 def test_a_camera_that_gives_no_picture_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

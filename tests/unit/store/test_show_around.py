@@ -41,7 +41,7 @@ def test_it_walks_to_three_places_takes_a_picture_of_each_comes_back_and_rests()
         "I go back",
         "I am back, I have kept 3 pictures and my path",
     ]
-    assert core.posture == "Crouch"
+    assert core.posture == "Sit"
     assert list(core.kept) == ["lamp.jpg", "table.jpg", "door.jpg", "path.png"]
     for name, view in zip(PLACES, views, strict=True):
         seen = cv2.imdecode(np.frombuffer(core.kept[f"{name}.jpg"], np.uint8), cv2.IMREAD_COLOR)
@@ -113,7 +113,7 @@ def test_a_robot_that_cannot_get_back_says_so_and_rests() -> None:
     core = tour(walks=[None, None, None, OBSTACLE, OBSTACLE, OBSTACLE])
     assert core.said()[-2] == "something is in my way, I cannot get back"
     assert core.said()[-1].startswith("I am not back, please help me, I have kept 3 pictures")
-    assert core.posture == "Crouch"
+    assert core.posture == "Sit"
     assert "path.png" in core.kept
 
 

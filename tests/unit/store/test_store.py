@@ -107,7 +107,7 @@ def test_look_around_says_each_code_once_and_rests() -> None:
     core = run("look_around", pictures=[code('{"name": "kitchen"}')] * 2 + [code("door")])
     assert core.said() == ["I read: kitchen", "I read: door"]
     assert [name for name, _ in core.calls if name == "look_at_point"] == ["look_at_point"] * 6
-    assert core.posture == "Crouch"
+    assert core.posture == "Sit"
 
 
 def test_look_around_says_that_there_is_nothing() -> None:

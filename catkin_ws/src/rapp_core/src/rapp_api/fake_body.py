@@ -12,7 +12,7 @@ from rapp_api.errors import Invalid, RappError, Refused
 from rapp_api.poses import Pose
 
 POSTURES = ("Stand", "StandInit", "StandZero", "Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
-RESTING = ("Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
+RESTING = ("Sit", "SitRelax", "Crouch", "LyingBelly", "LyingBack")
 ACTIONS = {
     "rapp_move_to": "move_to",
     "rapp_move_along_path": "move_along_path",

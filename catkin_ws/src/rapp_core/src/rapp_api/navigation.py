@@ -56,7 +56,7 @@ def look_at_point(x: float, y: float, z: float) -> None:
 
 
 def rest(posture: str = "") -> None:
-    """Take a resting posture ("": Crouch), and switch the motors off."""
+    """Take a resting posture ("": Sit), and switch the motors off."""
     current().rest(posture)
 
 

@@ -14,7 +14,7 @@ from rapp_core.services.joints import share_of_speed
 from rapp_core.services.moving import POSTURE, motion
 
 _log = logging.getLogger(__name__)
-RESTING = ("Crouch", "Sit", "SitRelax", "LyingBelly", "LyingBack")
+RESTING = ("Sit", "SitRelax", "Crouch", "LyingBelly", "LyingBack")
 
 
 def check(context: Context, share: Subsystem) -> None:
