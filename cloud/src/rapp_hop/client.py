@@ -18,7 +18,7 @@ from tornado.httpclient import HTTPRequest, HTTPResponse
 from tornado.simple_httpclient import SimpleAsyncHTTPClient
 
 from rapp_hop import strict_json
-from rapp_hop.connecting import BY_STATUS, CUT, NOT_SENT, fetch, make_connections, origin
+from rapp_hop.connecting import BY_STATUS, NOT_SENT, fetch, make_connections, origin
 from rapp_hop.errors import HopError, Invalid, Refused, Unreachable, from_wire
 from rapp_hop.protocol import TURNED_AWAY
 from rapp_hop.streaming import PARTIAL, Progress, Sink, Writer
@@ -51,8 +51,8 @@ class HopClient:
         :param socket_path: of a UNIX socket on which the platform serves; the URL then only fills the header `Host`
         :param ca_file: certificates (PEM) that may vouch for the platform, the system's when None
         :param retries: how often a call is repeated within its time. Repeated is only what is safe: a call of which nothing
-            was sent, one that was turned away before it began, and one to this platform whose connection was cut, as it
-            carries an `Idempotency-Key`, with which the platform runs it once
+            was sent, and one that was turned away before it began. One that was cut may have run: a platform knows by an
+            `Idempotency-Key` what it ran, but not what another of its processes did, or it itself before it was started anew
         :raises Invalid: when the URL is not an http(s) URL
         """
         self.base_url = base_url.rstrip("/")
@@ -182,18 +182,14 @@ class HopClient:
             self._client = make_connections(self._socket_path, max_clients=CLIENTS, max_buffer_size=MAX_ANSWER)
         loop = asyncio.get_running_loop()
         end = loop.time() + timeout
-        key = secrets.token_hex(16) if self._retries and parcel is not None and self._own(url) else ""
         for attempt in range(self._retries + 1):
             request = await self._request(url, parcel)
-            if key:
-                request.headers["Idempotency-Key"] = key
             left = end - loop.time() if attempt else timeout
             pause = PAUSE * 2**attempt * random.uniform(0.5, 1.5)
             try:
                 response = await fetch(self._client, request, left, self._connect_timeout)
             except Unreachable as error:
-                safe = error.reason == NOT_SENT or (error.reason == CUT and (key or parcel is None))
-                if not safe or attempt == self._retries or loop.time() + pause >= end:
+                if error.reason != NOT_SENT or attempt == self._retries or loop.time() + pause >= end:
                     raise
             else:
                 if "Retry-After" not in response.headers or attempt == self._retries or loop.time() + pause >= end:
