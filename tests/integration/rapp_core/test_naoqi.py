@@ -90,7 +90,30 @@ def test_a_folder_where_the_robot_may_not_write_is_refused(sim, connect, tmp_pat
         nao.recorder.stop()
 
 
-def test_the_order_of_figure_6_reaches_naoqi(sim, connect, wait_for):
+@pytest.fixture
+def received(monkeypatch):
+    """What NAOqi is asked, in order: (module, method), the word `asynchronous` behind it where nobody waited at once."""
+    asked = []
+    start, result = Connection.start, Connection.result
+
+    def started(connection, module, method, *args):
+        asked.append((module, method, "asynchronous"))
+        return start(connection, module, method, *args)
+
+    def awaited(connection, future, module, method, timeout=None):
+        if asked[-1] == (module, method, "asynchronous"):
+            asked[-1] = (module, method)
+        return result(connection, future, module, method, timeout)
+
+    monkeypatch.setattr(Connection, "start", started)
+    monkeypatch.setattr(Connection, "result", awaited)
+    return asked
+
+
+EARS, SOUNDS, RECORDER = "ALSpeechRecognition", "ALSoundDetection", "ALAudioRecorder"
+
+
+def test_the_order_of_figure_6_reaches_naoqi(sim, connect, received, wait_for):
     connection, nao = connect(sim())
     heard = []
     nao.ears.set_vocabulary(["Elizabeth", "Margaret"])
@@ -100,4 +123,20 @@ def test_the_order_of_figure_6_reaches_naoqi(sim, connect, wait_for):
     nao.ears.unsubscribe()
     assert heard[0].text == "Margaret"
     assert heard[0].probability > 0.4
+    assert received == [
+        (EARS, "pause"), (EARS, "setVocabulary"), (EARS, "pause"), ("ALMemory", "subscriber"), ("ALMemory", "subscriber"),
+        (SOUNDS, "subscribe"), (EARS, "subscribe"), (EARS, "unsubscribe"), (SOUNDS, "unsubscribe"),
+    ]  # fmt: skip
     assert connection.call("ALMemory", "getData", "LastWordRecognized")[0] == "Margaret"
+
+
+def test_the_order_of_figure_7_reaches_naoqi(sim, connect, received, tmp_path):
+    """Before it a recording that was left running is ended; nobody waits for the start, the end waits for both."""
+    _connection, nao = connect(sim())
+    nao.recorder.start(tmp_path / "recording.ogg")
+    nao.recorder.energy()
+    nao.recorder.stop()
+    start, stop = "startMicrophonesRecording", "stopMicrophonesRecording"
+    energy = ("ALAudioDevice", "getFrontMicEnergy")
+    assert received == [(RECORDER, stop), (RECORDER, start, "asynchronous"), energy, (RECORDER, stop)]
+    assert (tmp_path / "recording.ogg").exists()
