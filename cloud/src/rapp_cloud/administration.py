@@ -96,7 +96,7 @@ def _token(words: list[str]) -> int:
     parser.add_argument("--scope", action="append", default=[], help="what it allows (all that its holder may); may be repeated")
     parser.add_argument("--days", type=float, help="that it is good (until it is revoked)")
     parser.add_argument("--rate", type=float, help="calls per second (the platform's)")
-    parser.add_argument("--quota", type=int, help="calls per day (any number)")
+    parser.add_argument("--quota", type=int, help="calls and packages per day (any number)")
     options = parser.parse_args(words)
     life = options.days * 86400 if options.days else None
     with _memory(options) as memory:

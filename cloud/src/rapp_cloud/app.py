@@ -82,15 +82,15 @@ async def _serving(config: CloudConfig, shelf: Shelf, robots: Robots, memory: Me
     metrics = _metrics(robots, agents, certificate)
     checks = checks_of(memory, config.data, shelf.metadata / "timestamp.json", certificate)
     registry = _registry(config, shelf, interpreting, robots, agents, memory)
-    admit = Turnstile(memory.accounts, memory.quotas, time.monotonic).admit
-    server = MeasuredServer(metrics, admit, registry, doors.caller, config.data / "uploads", [
+    turnstile = Turnstile(memory.accounts, memory.quotas, time.monotonic)
+    server = MeasuredServer(metrics, turnstile.admit, registry, doors.caller, config.data / "uploads", [
         *entrance(memory.admission, memory.audit),
         *health(checks, metrics, memory.accounts.name_of, certificate),
-        store_files("/tuf/metadata/", shelf.metadata),
-        noted(store_files("/tuf/targets/", shelf.targets), memory),
+        turnstile.counted(store_files("/tuf/metadata/", shelf.metadata)),
+        turnstile.counted(noted(store_files("/tuf/targets/", shelf.targets), memory)),
         runs_page(),
-        weblets(shelf, "https" if certificate else "http"),
-        store_page(shelf),
+        turnstile.counted(weblets(shelf, "https" if certificate else "http")),
+        turnstile.counted(store_page(shelf)),
         agent_calls(agents),
     ], tls=certificate.context if certificate else None)  # fmt: skip
     keeping = [asyncio.create_task(_keep_fresh(shelf, config.refresh))]

@@ -15,7 +15,7 @@ from pathlib import Path
 from rapp_cloud.certificate import Certificate
 from rapp_cloud.memory import Memory
 from rapp_cloud.metrics import Metrics
-from rapp_cloud.tls import is_loopback
+from rapp_cloud.tls import is_here
 from rapp_hop import strict_json
 from rapp_hop.callers import token_of
 from rapp_hop.errors import HopError, Refused, Unreachable
@@ -55,8 +55,8 @@ def health(
         return WireAnswer(200, _PROMETHEUS, await asyncio.to_thread(metrics.text))
 
     def may_read(visit: Visit) -> bool:
-        here = is_loopback(visit.address) and not any("forwarded" in name for name in visit.request.headers)
-        return here or authenticate(token_of(visit.request.headers)) is not None
+        headers = visit.request.headers
+        return is_here(visit.address, headers) or authenticate(token_of(headers)) is not None
 
     return [
         _page("/healthz", healthz, lambda _visit: True),

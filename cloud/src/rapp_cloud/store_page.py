@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from html import escape
 
 from rapp_cloud.shelf import Offer, Shelf
+from rapp_cloud.views import Once
 from rapp_hop.errors import Refused
 from rapp_hop.hz.manifest import Manifest
 from rapp_hop.mounts import Mount, Visit
@@ -29,11 +30,13 @@ _POLICY = f"default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-ac
 def store_page(shelf: Shelf) -> Mount:
     """Serve the page, to everybody. Packages for some robots only are not on it."""
 
+    page = Once(shelf.manifests, lambda _: render(shelf.offers()).encode())
+
     async def answer(visit: Visit) -> WireAnswer:
         if visit.rest not in ("", "/"):
             raise Refused("cannot find this page: there is /store", 404)
-        text = await asyncio.to_thread(lambda: render(shelf.offers()))
-        return WireAnswer(200, "text/html; charset=UTF-8", text.encode(), (("Content-Security-Policy", _POLICY),))
+        text = await asyncio.to_thread(page)
+        return WireAnswer(200, "text/html; charset=UTF-8", text, (("Content-Security-Policy", _POLICY),))
 
     return Mount(PREFIX, answer, public=True, methods=frozenset({"GET", "HEAD"}))
 

@@ -5,7 +5,7 @@ Needed for every address but loopback: what robots send carries their tokens. No
 
 import ipaddress
 import ssl
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -29,6 +29,11 @@ def is_loopback(address: str) -> bool:
         return ipaddress.ip_address(address).is_loopback
     except ValueError:
         return address == "localhost"
+
+
+def is_here(address: str, headers: Mapping[str, str]) -> bool:
+    """Tell whether a request comes from a program on this computer, which no proxy here has passed on."""
+    return is_loopback(address) and not any("forwarded" in name for name in headers)
 
 
 def make_certificate(folder: Path, hosts: Sequence[str]) -> Path:

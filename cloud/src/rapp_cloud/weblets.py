@@ -7,9 +7,10 @@ import asyncio
 from urllib.parse import parse_qs
 
 from rapp_cloud.shelf import Shelf
+from rapp_cloud.views import Once
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.manifest import Manifest
-from rapp_hop.hz.weblet import resolve, synclist
+from rapp_hop.hz.weblet import escaped, resolve, synclist
 from rapp_hop.mounts import Mount, Visit
 from rapp_hop.protocol import WireAnswer
 from rapp_hop.results import ANY_TYPE
@@ -17,6 +18,7 @@ from rapp_hop.results import ANY_TYPE
 PREFIX = "/hop/weblets/"
 _TEXT = "text/plain; charset=UTF-8"
 _MAX_PATTERN = 200  # characters
+_HERE = "\0"  # in the list that is kept, for the URL by which the caller reaches us: no text of a package has it
 
 
 def weblets(shelf: Shelf, scheme: str) -> Mount:
@@ -27,12 +29,15 @@ def weblets(shelf: Shelf, scheme: str) -> Mount:
     :param scheme: http or https, as callers reach this platform
     """
 
+    listed = Once(shelf.manifests, lambda _: _listed(shelf))
+    whole = Once(shelf.manifests, lambda _: synclist(listed(), _HERE))
+
     async def answer(visit: Visit) -> WireAnswer:
         if visit.rest == "synclist":
-            host = visit.request.headers.get("host", "")
-            return WireAnswer(200, _TEXT, synclist(await _listed(shelf), f"{scheme}://{host}{PREFIX}download"))
+            here = escaped(f"{scheme}://{visit.request.headers.get('host', '')}{PREFIX}download")
+            return WireAnswer(200, _TEXT, (await asyncio.to_thread(whole)).replace(_HERE.encode(), here.encode()))
         if visit.rest == "resolve":
-            found = resolve(await _listed(shelf), _asked(visit))
+            found = resolve(await asyncio.to_thread(listed), _asked(visit))
             return WireAnswer(200, _TEXT, found.encode())
         if visit.rest == "download":
             file = await asyncio.to_thread(shelf.file_of, _asked(visit))
@@ -44,9 +49,8 @@ def weblets(shelf: Shelf, scheme: str) -> Mount:
     return Mount(PREFIX, answer, public=True, methods=frozenset({"GET", "HEAD"}))
 
 
-async def _listed(shelf: Shelf) -> list[Manifest]:
-    offers = await asyncio.to_thread(shelf.offers)
-    return [offer.manifest for offer in offers if offer.manifest.agent == "dynamic" and not offer.robots]
+def _listed(shelf: Shelf) -> list[Manifest]:
+    return [offer.manifest for offer in shelf.offers() if offer.manifest.agent == "dynamic" and not offer.robots]
 
 
 def _asked(visit: Visit) -> str:

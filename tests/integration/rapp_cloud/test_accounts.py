@@ -1,5 +1,6 @@
 """Accounts, tokens, codes and passwords, on both databases; and at the platform's port."""
 
+import asyncio
 import hashlib
 import io
 import json
@@ -28,10 +29,12 @@ from rapp_cloud.database import tables
 from rapp_cloud.database.engine import Database
 from rapp_cloud.memory import open_memory
 from rapp_cloud.quotas import DAY, Quotas
-from rapp_cloud.turnstile import Turnstile
+from rapp_cloud.turnstile import BURST, Turnstile
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Refused, Unreachable
 from rapp_hop.hz.delivery import Delivery
+from rapp_hop.mounts import Mount, Visit
+from rapp_hop.protocol import TURNED_AWAY, WireAnswer, WireRequest
 
 ROOT = b"{}"
 PATIENCE = 30.0  # s
@@ -182,6 +185,44 @@ def test_scopes_rates_and_quotas(accounts: Accounts, clock: Clock) -> None:
     turnstile.admit(few, "heartbeat")
 
 
+class Gate:
+    """A mount that everybody may fetch from, its visits counted on a clock that stands still."""
+
+    def __init__(self, turnstile: Turnstile) -> None:
+        async def answer(_visit: Visit) -> WireAnswer:
+            return WireAnswer(200, "text/plain", b"")
+
+        self._mount = turnstile.counted(Mount("/tuf/targets/", answer, public=True))
+
+    def lets_in(self, rest: str = "1.root.json", address: str = "192.0.2.1", token: str = "", **more: str) -> int:
+        """Visit a thousand times; gives how often it was answered."""
+        headers = {**({"accept-token": token} if token else {}), **more}
+        visit = Visit("", rest, WireRequest("GET", self._mount.prefix + rest, headers, b""), address)
+
+        async def visits() -> int:
+            answers = await asyncio.gather(*(self._mount.handler(visit) for _ in range(1000)), return_exceptions=True)
+            refused = [each for each in answers if isinstance(each, BaseException)]
+            assert {(type(each), each.status, each.reason) for each in refused} <= {(Unreachable, 429, TURNED_AWAY)}
+            return 1000 - len(refused)
+
+        return asyncio.run(visits())
+
+
+def test_what_everybody_may_fetch_has_its_bounds_too(accounts: Accounts, clock: Clock) -> None:
+    gate = Gate(Turnstile(accounts, Quotas(accounts.database, clock), lambda: 0.0))
+    accounts.add_robot("nao")
+    free, slow, few = accounts.give("nao"), accounts.give("nao", rate=1.0), accounts.give("nao", quota=3)
+    assert gate.lets_in() == gate.lets_in(address="192.0.2.2") == BURST
+    assert gate.lets_in() == gate.lets_in(token="nobody's" * 4) == 0
+    assert gate.lets_in(token=free) == BURST, "a robot is not its address"
+    assert gate.lets_in(address="127.0.0.1") == gate.lets_in(address="127.0.0.1", token=free) == 1000
+    assert gate.lets_in(address="127.0.0.1", forwarded="for=192.0.2.3") == BURST
+    assert gate.lets_in(address="127.0.0.1", token=slow) == BURST
+    assert gate.lets_in(address="127.0.0.1", token=few) == 1000, "lists are no calls"
+    assert gate.lets_in("0.hello-1.0.0.hz", "127.0.0.1", few) == 3, "packages are"
+    assert gate.lets_in("download", "127.0.0.1", few) == 0
+
+
 @pytest.fixture(scope="module")
 def cloud(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CloudProcess]:
     folder = tmp_path_factory.mktemp("accounts")
@@ -208,6 +249,17 @@ def _post(cloud: CloudProcess, path: str, value: object, token: str = "") -> tup
             return error.code, json.load(error), error.headers.get("Retry-After", "")
 
 
+def _fetch(cloud: CloudProcess, path: str, token: str) -> int:
+    """Status."""
+    request = urllib.request.Request(f"http://127.0.0.1:{cloud.port}{path}", headers={"Accept-Token": token})
+    try:
+        with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as error:
+        with error:
+            return int(error.code)
+
+
 def _seen(cloud: CloudProcess, token: str, status: int) -> tuple[int, Any, str]:
     """Ask until the platform has seen what a command has changed."""
     deadline = time.monotonic() + PATIENCE
@@ -215,6 +267,16 @@ def _seen(cloud: CloudProcess, token: str, status: int) -> tuple[int, Any, str]:
         assert time.monotonic() < deadline, found
         time.sleep(0.1)
     return found
+
+
+def test_packages_count_to_a_day_s_calls(cloud: CloudProcess, tmp_path: Path) -> None:
+    _command(cloud, "token", "nao", str(tmp_path / "few"), "--quota", "3")
+    token = (tmp_path / "few").read_text()
+    _seen(cloud, token, 200)
+    package = next(path.name for path in (cloud.data / "tuf/targets").iterdir())
+    assert {_fetch(cloud, path, token) for path in ("/store", "/tuf/metadata/1.root.json", "/hop/weblets/synclist")} == {200}
+    assert [_fetch(cloud, f"/tuf/targets/{package}", token) for _ in range(3)] == [200, 200, 429]
+    assert _fetch(cloud, "/hop/weblets/download?weblet=hello-1.0.0.hz", token) == 429
 
 
 def test_a_robot_joins_and_works_and_is_thrown_out(cloud: CloudProcess) -> None:

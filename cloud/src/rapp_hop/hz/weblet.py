@@ -74,6 +74,10 @@ def _fields(manifest: Manifest) -> list[str]:
     return [_field(name, value) for name, value in fields.items()]
 
 
+def escaped(value: str) -> str:
+    """Return a text as it stands between the quotation marks of such a list."""
+    return value.replace("\\", "\\\\").replace('"', '\\"')
+
+
 def _field(name: str, value: str) -> str:
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-    return f'({name} "{escaped}")'
+    return f'({name} "{escaped(value)}")'
