@@ -13,6 +13,7 @@ from rapp_cli.errors import CommandError, UsageError
 from rapp_cli.mail_account import MailAccount
 from rapp_cli.paths import STORE
 from rapp_cli.secrecy import CLOUD, confided
+from rapp_cloud.profiles import sound_of
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")  # where HTTP without encryption is allowed
 USER = "Maria"  # whom the robot serves
@@ -65,8 +66,8 @@ def make_platform(data: Path, robot: str) -> None:
 
 
 def contacts_with(name: str, address: str) -> dict[str, str]:
-    """The user's contacts and one more, who takes the place of one of the same name."""
-    others = {known: known_address for known, known_address in CONTACTS.items() if known.casefold() != name.casefold()}
+    """The user's contacts and one more, who takes the place of one whose name sounds the same."""
+    others = {known: known_address for known, known_address in CONTACTS.items() if sound_of(known) != sound_of(name)}
     return {name: address, **others}
 
 

@@ -8,7 +8,7 @@ import logging
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, count
 from pathlib import Path
 
@@ -106,7 +106,9 @@ class People:
             found = _read(connection, person)
             if found is None:
                 raise Refused(f"cannot find the person {person[:70]!r}: add them first")
-            changed = parse_profile(change(found.profile).describe())
+            changed = change(found.profile)
+            if not _forgets_only(changed, found.profile):
+                changed = parse_profile(changed.describe())
             self._put(connection, person, changed)
         return changed
 
@@ -179,6 +181,11 @@ def _all(connection: sa.Connection) -> list[Person]:
 
 def _read(connection: sa.Connection, person: str) -> Person | None:
     return next((one for one in _all(connection) if one.person == person), None)
+
+
+def _forgets_only(changed: Profile, profile: Profile) -> bool:
+    """Whether there are only fewer contacts: so a profile is mended that an older platform took."""
+    return changed == replace(profile, contacts=changed.contacts) and set(changed.contacts) < set(profile.contacts)
 
 
 def _served_by(connection: sa.Connection, robot: str) -> list[str]:

@@ -8,7 +8,7 @@ from rapp_hop.errors import Invalid
 from rapp_hop.hz.text import check_text
 
 MAX_BYTES = 2**20  # of one profile
-MAX_CONTACTS = 1000
+MAX_CONTACTS = 100  # as many words as a robot listens for at once
 _ADDRESS = re.compile(r"[^\s@<>,;:\"()\\\[\]\x00-\x1f\x7f]{1,64}@[A-Za-z0-9.-]{1,255}")
 
 
@@ -46,8 +46,26 @@ def parse_profile(value: Any) -> Profile:
     return Profile(
         check_text(_text(value, "name"), 100, "the profile's name"),
         check_text(_text(value, "language"), 16, "the profile's language"),
-        tuple(_contact(item) for item in contacts),
+        _apart([_contact(item) for item in contacts]),
     )
+
+
+def sound_of(name: str) -> str:
+    """What is heard of a written name: its letters and digits; "" when nobody can say it."""
+    return "".join(sign for sign in name.casefold() if sign.isalnum())
+
+
+def _apart(contacts: list[Contact]) -> tuple[Contact, ...]:
+    """The contacts, which a robot has to tell from each other by ear."""
+    heard: dict[str, str] = {}
+    for contact in contacts:
+        sound = sound_of(contact.name)
+        if not sound:
+            raise Invalid(f"cannot read the profile: nobody can say {contact.name!r}; give the contact a name with letters")
+        if sound in heard:
+            raise Invalid(f"cannot read the profile: {contact.name!r} sounds like {heard[sound]!r}; give one another name")
+        heard[sound] = contact.name
+    return tuple(contacts)
 
 
 def _contact(value: Any) -> Contact:

@@ -94,6 +94,18 @@ def test_what_is_wrong_changes_nothing(people: People) -> None:
     assert people.profile("nao") == MARIA
 
 
+def test_a_profile_that_an_older_platform_took_is_mended_by_forgetting(people: People) -> None:
+    unnamed, again = Contact("...", "x@home.example"), Contact("elizabeth", "other@home.example")
+    people.add("eve", Profile("Eve", "en", (ELIZABETH, unnamed, again)))
+    for left in ((ELIZABETH, again), (ELIZABETH,)):
+        with pytest.raises(Invalid):
+            people.edit("eve", lambda profile: replace(profile, language="de"))
+        with pytest.raises(Invalid):
+            people.edit("eve", lambda profile, left=left: replace(profile, contacts=left, name=""))
+        people.edit("eve", lambda profile, left=left: replace(profile, contacts=left))
+    assert people.edit("eve", lambda profile: replace(profile, language="de")).contacts == (ELIZABETH,)
+
+
 def test_who_goes_takes_account_tokens_and_contacts_along(people: People, accounts: Accounts, database: Database) -> None:
     admission = Admission(accounts)
     admission.enrol("maria", "user", "correct horse")

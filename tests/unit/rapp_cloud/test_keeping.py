@@ -7,8 +7,9 @@ import pytest
 from rapp_cloud.catalogue import RobotKind
 from rapp_cloud.config import load_config
 from rapp_cloud.files import write_whole
-from rapp_cloud.profiles import parse_profile
+from rapp_cloud.profiles import MAX_CONTACTS, Profile, parse_profile
 from rapp_cloud.robots import Robots
+from rapp_core.services.recognise import MOST
 from rapp_hop.errors import Invalid, Refused
 
 NAO = RobotKind("nao", "1.0")
@@ -27,11 +28,32 @@ def test_h19_addresses_that_are_none(address: str) -> None:
     [[], {}, {"name": "M"}, {"name": "M", "language": "en", "contacts": {}}, {"name": "M", "language": "en", "contacts": ["x"]},
      {"name": "M\n", "language": "en"}, {"name": 3, "language": "en"},
      {"name": "M", "language": "en", "contacts": [{"name": "x"}]},
-     {"name": "M", "language": "en", "contacts": [{"name": "x", "address": "a@b"}] * 1001}],
+     {"name": "M", "language": "en", "contacts": [{"name": f"x{number}", "address": "a@b"} for number in range(101)]}],
 )  # fmt: skip
 def test_broken_profiles(value: object) -> None:
     with pytest.raises(Invalid):
         parse_profile(value)
+
+
+def named(*names: str) -> Profile:
+    return parse_profile({"name": "M", "language": "en", "contacts": [{"name": name, "address": "a@b"} for name in names]})
+
+
+def test_a_robot_can_listen_for_all_contacts_of_a_profile() -> None:
+    assert MAX_CONTACTS == MOST
+    assert len(named(*(f"x{number}" for number in range(MAX_CONTACTS))).contacts) == MAX_CONTACTS
+
+
+@pytest.mark.parametrize("name", ["...", "†", " _ "])
+def test_a_contact_whom_nobody_can_name_is_refused(name: str) -> None:
+    with pytest.raises(Invalid, match=r"nobody can say .*; give the contact a name with letters"):
+        named("Elizabeth", name)
+
+
+@pytest.mark.parametrize(("one", "other"), [("Anna", "Anna"), ("Anna", "anna"), ("Anne-Marie", "Anne Marie"), ("J. Doe", "J Doe")])
+def test_contacts_whose_names_sound_the_same_are_refused(one: str, other: str) -> None:
+    with pytest.raises(Invalid, match=f"'{other}' sounds like '{one}'"):
+        named(one, "Żaneta", "李雷", other)
 
 
 def test_a_lease_ends_without_heartbeats_and_lives_with_them() -> None:

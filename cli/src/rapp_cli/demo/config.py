@@ -13,6 +13,7 @@ from rapp_cli import mail_account
 from rapp_cli.demo.mailbox import words_heard
 from rapp_cli.errors import UsageError
 from rapp_cli.mail_account import MailAccount
+from rapp_cloud.profiles import sound_of
 
 VOICE_MAIL, SHOW_AROUND, HAZARD = "voice-mail", "show-around", "hazard"
 KEYWORDS = {VOICE_MAIL: "e-mail", SHOW_AROUND: "show me around", HAZARD: "is everything safe"}
@@ -47,6 +48,7 @@ class DemoConfig:
     light: bool = True  # whether the lamp is on
     write: bool = False  # whether the carer is to be written to
     start: str = ""  # the place of the room where the robot starts; "": its usual one
+    language: str = "en"  # of the robot's keywords
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -86,8 +88,8 @@ def read(options: argparse.Namespace, env: Mapping[str, str] = os.environ) -> De
     if account and not options.address and not cloud:
         raise UsageError("cannot use a real mail account without a real recipient: give --address NAME@DOMAIN")
     _check_story(options, env)
-    if not options.recipient.strip() or not options.message.strip():
-        raise UsageError("cannot send a voice-mail without --recipient and --message")
+    if not sound_of(options.recipient) or not options.message.strip():
+        raise UsageError("cannot send a voice-mail without --recipient, a name that can be said, and --message")
     if not words_heard(options.message, options.message):
         raise UsageError(f"cannot judge whether “{options.message}” arrives: give a --message with a word of three letters or more")
     return DemoConfig(
