@@ -2,9 +2,11 @@
 
 import asyncio
 import json
+import os
 import sys
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
@@ -42,6 +44,25 @@ def latest(record: Path, size: int = 1 << 18) -> list[Entry]:
     except FileNotFoundError:
         return []
     return [entry for entry in map(_entry, found) if entry is not None]
+
+
+def backwards(record: Path, words: Sequence[str] = ("",), most: int = 1 << 26, block: int = 1 << 18) -> Iterator[Entry]:
+    """The entries of such a file whose line has one of the words, the last one first, out of its last `most` bytes.
+
+    It is read as far as entries are taken, `block` bytes at a time.
+    """
+    wanted = [word.encode() for word in words]
+    with suppress(FileNotFoundError), record.open("rb") as lines:
+        end = lines.seek(0, os.SEEK_END)
+        first, cut = max(0, end - most), b""
+        while end > first:
+            begin = max(first, end - block)
+            lines.seek(begin)
+            cut, *whole = (lines.read(end - begin) + cut).split(b"\n")
+            for line in reversed([cut, *whole] if begin == 0 else whole):
+                if any(word in line for word in wanted) and (entry := _entry(line)) is not None:
+                    yield entry
+            end = begin
 
 
 def _entry(line: bytes) -> Entry | None:

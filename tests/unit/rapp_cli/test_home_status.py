@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from dataclasses import asdict
 from typing import Any
 
 import pytest
@@ -10,7 +11,7 @@ from fakes.rapps import install_rapp
 from rapp_cli.errors import CommandError
 from rapp_cli.home import platform, retry, status
 from rapp_cli.home.place import Home, Settings
-from rapp_cli.home.status import State, Status
+from rapp_cli.home.status import State, Status, Told
 from rapp_cli.home.supervisor import Process
 from rapp_cli.timeline import Entry, append
 from rapp_core.config import Config
@@ -44,7 +45,7 @@ BOTH = {name: process(name) for name in ("recorder", "core_agent")}
 
 
 def core(entries: list[Entry], processes: dict[str, Process] | None = None) -> State | None:
-    return status._core(entries, BOTH if processes is None else processes)
+    return status._told(reversed(entries), BOTH if processes is None else processes).core
 
 
 def test_the_core_agent_is_in_the_state_it_entered_last() -> None:
@@ -60,6 +61,43 @@ def test_the_core_agent_is_in_the_state_it_entered_last() -> None:
 
 def test_the_state_of_an_earlier_core_agent_is_not_that_of_the_present_one() -> None:
     assert core([Entry("core", "core", "s3", "entered", "listen", NOW - 61)]) is None
+
+
+RUN = [
+    Entry("dynamic", "dynamic", "s3", "entered", "execute", NOW - 50),
+    Entry("core", "core", "s7", "entered", "activate", NOW - 10),
+    Entry("core", "core", "s8", "entered", "await first word", NOW - 9),
+    Entry("link", "link", "s8", "message", "link->core reply start_cloud_agent hazard", NOW - 8),
+    Entry("core", "core", "s9", "entered", "await and execute commands", NOW - 7),
+    Entry("dynamic", "dynamic", "s3", "entered", "execute", NOW - 6),
+    Entry("dynamic", "voice_mail", "s34", "entered", "record message content", NOW - 5),
+]
+
+
+@pytest.mark.usefixtures("silent")
+def test_a_rapp_that_tells_much_hides_neither_the_core_agents_state_nor_its_own(home: Home) -> None:
+    home.keep(Settings("nao", None, None, None, (), {"rosbridge": 1}))
+    for folder, name in ((home.robot, "hazard"), (home.cloud / "agents", "hazard_cloud")):
+        (folder / "runs" / "1" / "package").mkdir(parents=True)
+        (folder / "runs" / "1" / "package" / "package.json").write_text(json.dumps({"name": name}))
+    for entry in RUN:
+        append(home.timeline, entry)
+    call = json.dumps(asdict(Entry("core", "core", "s9", "message", "dynamic->core rapp_get_robot_pose", NOW))) + "\n"
+    with home.timeline.open("a") as lines:
+        lines.write(call * 10_000)
+    shown = status.text(home, status.read(home, BOTH), NOW)
+    assert "core agent  s9 await and execute commands, since" in shown
+    assert "RApp        hazard, s34 record message content, since" in shown
+    assert "(5 s)" in shown
+    assert "cloud agent hazard_cloud, since" in shown
+    assert "(8 s)" in shown
+
+
+def test_what_a_run_before_has_told_is_not_of_this_one() -> None:
+    told = status._told(reversed(RUN[:3]), BOTH)
+    assert told == Told(State("s8", "await first word", NOW - 9))
+    told = status._told(reversed([*RUN, Entry("core", "core", "s3", "entered", "listen", NOW)]), BOTH)
+    assert told == Told(State("s3", "listen", NOW))
 
 
 @pytest.mark.parametrize("away", ["recorder", "core_agent"])

@@ -2,8 +2,11 @@
 
 import asyncio
 import io
+from pathlib import Path
 
-from rapp_cli.timeline import Entry, Timeline
+import pytest
+
+from rapp_cli.timeline import Entry, Timeline, append, backwards
 
 
 def test_entries_are_printed_with_agent_state_and_words() -> None:
@@ -36,3 +39,18 @@ def test_a_waiter_sees_entries_of_before_and_after_but_not_twice() -> None:
         return first, await waiting
 
     assert asyncio.run(story()) == (1, 3)
+
+
+@pytest.mark.parametrize("block", [1, 7, 100, 1 << 18])
+def test_a_record_is_read_from_its_end_as_far_as_is_wanted(tmp_path: Path, block: int) -> None:
+    path = tmp_path / "timeline.jsonl"
+    assert list(backwards(path)) == []
+    written = [Entry("core", "core", f"s{number}", "entered", "é" * number, float(number)) for number in range(9)]
+    for entry in written:
+        append(path, entry)
+    with path.open("a") as lines:
+        lines.write('{"agent": "co')
+    assert list(backwards(path, block=block)) == written[::-1]
+    assert list(backwards(path, ('"s3"', '"s5"'), block=block)) == [written[5], written[3]]
+    size = path.stat().st_size
+    assert list(backwards(path, most=size - 1, block=block)) == written[:0:-1]

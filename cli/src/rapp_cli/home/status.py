@@ -4,15 +4,15 @@ import argparse
 import asyncio
 import json
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from rapp_cli.home import platform
 from rapp_cli.home.agents import CORE, RECORDER
 from rapp_cli.home.place import Home, add_home_option, home_of
 from rapp_cli.home.supervisor import Process, Supervisor, process_state
-from rapp_cli.timeline import Entry, latest
+from rapp_cli.timeline import Entry, backwards
 from rapp_core.config import Config
 from rapp_core.control.quarantine import Entry as Failing
 from rapp_core.control.quarantine import Quarantine
@@ -23,11 +23,12 @@ from rapp_link.letter import from_json
 ALL_RUN, SOMETHING_DOES_NOT, NOTHING_IS_UP = 0, 1, 3
 PATIENCE = 1.5  # s for the link's sign of life
 RUNS_A_RAPP = ("s7", "s8", "s9", "s10")  # states of the core FSM
+CLOUD_AGENT_RUNS = "link->core reply start_cloud_agent"
 
 
 @dataclass(frozen=True)
 class State:
-    """Where the core FSM is."""
+    """Where an FSM is."""
 
     state: str
     name: str
@@ -47,6 +48,17 @@ class Status:
     cloud_agent: str | None = None  # name of its package, when the running RApp has one at the home's own platform
     quarantine: Mapping[str, Failing] = field(default_factory=dict)  # RApps that keep failing, and are not started for a while
     mails_undelivered: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  # file: recipient: the server's words
+    dynamic_agent: State | None = None  # where the RApp that runs is; None: none runs, or it has told nothing yet
+    cloud_agent_since: float | None = None  # s since 1970
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the agents have told of where they are."""
+
+    core: State | None = None
+    dynamic: State | None = None
+    cloud_agent_since: float | None = None
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -70,14 +82,16 @@ def run(options: argparse.Namespace) -> int:
 def read(home: Home, processes: Mapping[str, Process]) -> Status:
     """Put together what supervisor, recorder, link and the robot's folders tell."""
     agents = [_frozen(process) for process in processes.values()]
-    core = _core(latest(home.timeline), processes)
-    running = core is not None and core.state in RUNS_A_RAPP
+    told = _told(backwards(home.timeline, ('"entered"', CLOUD_AGENT_RUNS)), processes)
+    running = told.core is not None and told.core.state in RUNS_A_RAPP
     registered = asyncio.run(platform.registered(home.settled().bridge, PATIENCE)) if processes else None
     rapp, agent = (_rapp(folder) if running else None for folder in (home.robot / "runs", home.cloud / "agents" / "runs"))
     installed = {name: manifest.version.text for name, manifest in RappFolder(home.robot / "rapps").list().items()}
     failing = Quarantine(Config(home=home.robot)).present()
     waiting, undelivered = _mails(home.robot)
-    return Status(agents, core, rapp, registered, waiting, installed, agent, failing, undelivered)
+    return Status(
+        agents, told.core, rapp, registered, waiting, installed, agent, failing, undelivered, told.dynamic, told.cloud_agent_since
+    )
 
 
 def _frozen(process: Process) -> Process:
@@ -87,14 +101,27 @@ def _frozen(process: Process) -> Process:
     return Process(process.name, "FROZEN", process.since, process.pid, "stopped by a signal; see kill -CONT")
 
 
-def _core(entries: Sequence[Entry], processes: Mapping[str, Process]) -> State | None:
-    """The state entered last, unless the recorder or the core agent is not there, or has not been for long enough."""
+def _told(entries: Iterable[Entry], processes: Mapping[str, Process]) -> Told:
+    """The states entered last, unless the recorder or the core agent is not there, or has not been for long enough.
+
+    :param entries: the last one first; they are taken back to the begin of the run
+    """
+    told = Told()
     if not all(name in processes and processes[name].runs for name in (CORE, RECORDER)):
-        return None
-    for entry in reversed(entries):
+        return told
+    for entry in entries:
+        if entry.time < processes[CORE].since:
+            break
+        state = State(entry.state, entry.detail, entry.time)
         if entry.agent == "core" and entry.kind == "entered" and "/" not in entry.state:
-            return State(entry.state, entry.detail, entry.time) if entry.time >= processes[CORE].since else None
-    return None
+            told = replace(told, core=told.core or state)
+            if entry.state not in RUNS_A_RAPP[1:]:
+                break
+        elif entry.agent == "dynamic" and entry.kind == "entered":
+            told = replace(told, dynamic=told.dynamic or state)
+        elif entry.detail.startswith(CLOUD_AGENT_RUNS):
+            told = replace(told, cloud_agent_since=told.cloud_agent_since or entry.time)
+    return told if told.core is not None and told.core.state in RUNS_A_RAPP else Told(told.core)
 
 
 def _rapp(runs: Path) -> str | None:
@@ -130,10 +157,10 @@ def text(home: Home, status: Status, now: float) -> str:
         for process in status.agents
     ] or [f"nothing is up; start it with {home.command('up')}"]
     if status.agents:
-        core = status.core
-        lines += ["", f"core agent  {f'{core.state} {core.name}, since {_when(core.since, now)}' if core else 'state not known'}"]
-        lines += [f"RApp        {status.rapp or 'none runs'}"]
-        lines += [f"cloud agent {status.cloud_agent}"] if status.cloud_agent else []
+        lines += ["", f"core agent  {_where(status.core, now) or 'state not known'}"]
+        lines += [f"RApp        {', '.join(filter(None, (status.rapp or 'none runs', _where(status.dynamic_agent, now))))}"]
+        since = f", since {_when(status.cloud_agent_since, now)}" if status.cloud_agent_since else ""
+        lines += [f"cloud agent {status.cloud_agent}{since}"] if status.cloud_agent else []
         standing = {True: "registered", False: "not registered: it is away", None: "not known: the link does not answer"}
         lines += [f"platform    {standing[status.registered]}"]
     lines += [f"installed   {', '.join(f'{name} {version}' for name, version in status.installed.items()) or 'no RApp'}"]
@@ -145,6 +172,10 @@ def text(home: Home, status: Status, now: float) -> str:
         words = "; ".join(f"{name}: {said}" for name, said in refused.items())
         lines += [f"not sent    to {words}; the mail is {path}, remove it when it is not needed any more"]
     return "\n".join(lines)
+
+
+def _where(state: State | None, now: float) -> str:
+    return f"{state.state} {state.name}, since {_when(state.since, now)}" if state else ""
 
 
 def _when(moment: float, now: float) -> str:
