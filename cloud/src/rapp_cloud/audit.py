@@ -1,8 +1,8 @@
-"""Who published, installed and ran what, and who was let in or out: a log that is only added to, and shows when it was changed.
+"""Who published, downloaded and ran what, whose keys changed, who was let in or out: a log that is only added to.
 
-Each entry is sealed with a key that lies outside the database, over itself and the seal before it: a row that is changed,
-taken out or put in later breaks all seals from there on. The newest seal is also in the process's log, so that taking off
-the end shows too.
+Each entry is sealed with a key that lies outside the database, over itself and the seal before it, so changes show: a row
+that is changed, taken out or put in later breaks all seals from there on. The newest seal is also in the process's log, so
+that taking off the end shows too.
 """
 
 import contextlib

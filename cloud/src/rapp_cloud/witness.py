@@ -1,5 +1,6 @@
 """What the platform itself sees of who did what, for the audit log: downloads by robots, and what was put on offer."""
 
+import getpass
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -41,12 +42,16 @@ def noting_offers(data: Path, shelf: Shelf, url: str | None) -> Iterator[None]:
     """Note what the block changes of a store's offers; for commands, which have no platform's memory open. Blocking.
 
     :param url: see `open_memory`
+    :raises HopError: when the log cannot be opened; the block is not begun then
     """
-    before = shelf.offers()
-    try:
-        yield
-    finally:
-        after = shelf.offers()
-        if {offer.sha256 for offer in before} != {offer.sha256 for offer in after}:
-            with open_memory(data, url) as memory:
-                note_offers(memory.audit, before, after)
+    with open_memory(data, url) as memory:
+        before = shelf.offers()
+        try:
+            yield
+        finally:
+            note_offers(memory.audit, before, shelf.offers())
+
+
+def operator() -> str:
+    """Return who gives a command at the platform, for its audit log."""
+    return f"{getpass.getuser()} at the platform"

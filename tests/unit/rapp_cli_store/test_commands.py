@@ -10,6 +10,7 @@ from rapp_cli.__main__ import main
 from rapp_cli.cloud import own_rapps
 from rapp_cli.store.permissions import missing_permissions
 from rapp_cloud.app import open_shelf
+from rapp_cloud.memory import open_memory
 from rapp_hop.hz.archive import build
 from rapp_hop.hz.manifest import parse_manifest
 
@@ -161,6 +162,36 @@ def test_several_root_keys_from_the_terminal(desk: Desk) -> None:
     assert re.search(r"(?m)^root .* key here, 2 of 3 sign ", desk.does("keys", "list"))
     assert desk.does("keys", "rotate", "root") == "root has a new key\n"
     assert "cannot have 3 of 2 keys sign" in desk.refuses("keys", "root", "--keys", "2", "--threshold", "3")
+
+
+def test_changes_of_keys_are_in_the_audit_log(desk: Desk) -> None:
+    desk.does("keys", "new", "maria")
+    desk.does("keys", "grant", "maria", "clock", "lamp")
+    desk.refuses("keys", "rotate", "nobody")
+    desk.does("keys", "rotate", "snapshot")
+    desk.does("keys", "root", "--keys", "3", "--threshold", "2")
+    desk.does("keys", "revoke", "maria")
+    desk.does("keys", "resume")
+    with open_memory(desk.data) as memory:
+        entries = memory.audit.entries()
+    assert [(entry.deed, entry.subject) for entry in entries] == [
+        ("keys new", "maria"), ("keys grant", "maria"), ("keys rotate", "snapshot"), ("keys root", "root"),
+        ("keys revoke", "maria"), ("keys resume", "root"),
+    ]  # fmt: skip
+    assert entries[1].detail == {"rapp": ["clock", "lamp"]}
+    assert all(entry.who.endswith(" at the platform") for entry in entries)
+
+
+def test_nothing_changes_while_the_audit_log_is_away(desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk.does("publish", source_folder(tmp_path))
+    before = desk.does("store", "show", "hello"), desk.does("keys", "list")
+    monkeypatch.setenv("RAPP_CLOUD_DATABASE", f"postgresql://rapp@/rapp?host={tmp_path}")
+    for words in (
+        ("publish", source_folder(tmp_path, version="1.1.0")), ("store", "yank", "hello", "1.0.0"), ("keys", "new", "maria"),
+        ("keys", "revoke", "rapp"),
+    ):  # fmt: skip
+        assert "cannot use the database now" in desk.refuses(*words)
+    assert (desk.does("store", "show", "hello"), desk.does("keys", "list")) == before
 
 
 def test_packages_as_files(desk: Desk, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,9 +5,11 @@ from pathlib import Path
 
 from rapp_cli.errors import UsageError
 from rapp_cli.store.own_key import add_own_options, make_own
-from rapp_cli.store.place import add_store_options, keys_of, store_of, told
+from rapp_cli.store.place import add_store_options, audit_of, keys_of, store_of, told
 from rapp_cloud.administration import refused_until_renewed
+from rapp_cloud.custody import Custody
 from rapp_cloud.keys import ROOTS
+from rapp_cloud.witness import operator
 from rapp_hop.errors import Invalid
 from rapp_hop.hz.application import Application, read_application
 
@@ -50,23 +52,37 @@ def run(options: argparse.Namespace) -> int:
         return make_own(options)
     custody = store_of(options).custody
     if options.action == "list":
-        for holder in custody.holders():
-            until = f"{holder.expires:%F %R}" if holder.expires else "revoked"
-            here = "key here" if holder.here else "key elsewhere" if holder.keys else ""
-            here += f", {holder.threshold} of {len(holder.keys)} sign" if len(holder.keys) > 1 else ""
-            print(f"{holder.name:<12} {until:<16} {here:<13} {' '.join(holder.keys)}  {', '.join(holder.packages)}".rstrip())
+        _list(custody)
         return 0
-    if options.action == "root":
-        custody.share_root(options.keys, options.threshold)
-        names = ", ".join(f"{name}.pem" for name in ROOTS[: options.keys])
-        print(f"root has {options.keys} keys in {keys_of(options).folder}, {options.threshold} must sign: {names}")
-        print("rapp keys: keep them apart, where no one thief and no one fire reaches as many as must sign")
-        return 0
-    if options.action == "resume":
-        for package in custody.resume():
-            print(refused_until_renewed(package))
-        print("robots believe this store; run it again if one that saw many new keys still refuses")
-        return 0
+    with audit_of(options) as audit:
+        {"root": _share_root, "resume": _resume}.get(options.action, _change)(custody, options)
+        given = {name: value for name in ("rapp", "keys", "threshold") if (value := getattr(options, name, None))}
+        audit.add(operator(), f"keys {options.action}", getattr(options, "name", "root"), **given)
+    return 0
+
+
+def _list(custody: Custody) -> None:
+    for holder in custody.holders():
+        until = f"{holder.expires:%F %R}" if holder.expires else "revoked"
+        here = "key here" if holder.here else "key elsewhere" if holder.keys else ""
+        here += f", {holder.threshold} of {len(holder.keys)} sign" if len(holder.keys) > 1 else ""
+        print(f"{holder.name:<12} {until:<16} {here:<13} {' '.join(holder.keys)}  {', '.join(holder.packages)}".rstrip())
+
+
+def _share_root(custody: Custody, options: argparse.Namespace) -> None:
+    custody.share_root(options.keys, options.threshold)
+    names = ", ".join(f"{name}.pem" for name in ROOTS[: options.keys])
+    print(f"root has {options.keys} keys in {keys_of(options).folder}, {options.threshold} must sign: {names}")
+    print("rapp keys: keep them apart, where no one thief and no one fire reaches as many as must sign")
+
+
+def _resume(custody: Custody, _options: argparse.Namespace) -> None:
+    for package in custody.resume():
+        print(refused_until_renewed(package))
+    print("robots believe this store; run it again if one that saw many new keys still refuses")
+
+
+def _change(custody: Custody, options: argparse.Namespace) -> None:
     if options.action in ("new", "rotate"):
         (custody.add if options.action == "new" else custody.rotate)(options.name, _application(options))
     elif options.action == "grant":
@@ -74,7 +90,6 @@ def run(options: argparse.Namespace) -> int:
     else:
         custody.revoke(options.name)
     print(f"{options.name} {_DONE[options.action]}")
-    return 0
 
 
 def _application(options: argparse.Namespace) -> Application | None:

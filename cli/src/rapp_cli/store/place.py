@@ -10,8 +10,10 @@ from pathlib import Path
 from rapp_cli.errors import CommandError, UsageError
 from rapp_cli.home.place import add_home_option, home_of
 from rapp_cloud.app import open_shelf
+from rapp_cloud.audit import Audit
 from rapp_cloud.config import load_config
 from rapp_cloud.keys import KeyRing, passphrase_from
+from rapp_cloud.memory import open_memory
 from rapp_cloud.shelf import Shelf
 from rapp_cloud.witness import noting_offers
 from rapp_hop.errors import HopError, Invalid
@@ -40,6 +42,14 @@ def noting(options: argparse.Namespace, shelf: Shelf) -> Iterator[None]:
     data = data_of(options)
     with noting_offers(data, shelf, load_config(data, {}, os.environ).database):
         yield
+
+
+@contextmanager
+def audit_of(options: argparse.Namespace) -> Iterator[Audit]:
+    """The platform's audit log, open before the block changes anything."""
+    data = data_of(options)
+    with open_memory(data, load_config(data, {}, os.environ).database) as memory:
+        yield memory.audit
 
 
 def keys_of(options: argparse.Namespace) -> KeyRing:
