@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
 def _sound(path: Path) -> Path:
     try:
         soundfile.info(path)
-    except (soundfile.LibsndfileError, OSError) as error:
+    except (soundfile.LibsndfileError, OSError, TypeError) as error:  # TypeError: headerless samples, by the name .raw
         raise UsageError(f"cannot play {path}: {error}; give a sound file") from error
     return path.resolve()
 
