@@ -220,9 +220,9 @@ def test_walks_along_a_path(side: Side) -> None:
 
 
 def test_begins_to_walk_and_stops(side: Side) -> None:
-    side.call(navigation.move_vel, 0.05, 0.0, 0.1)
-    side.call(navigation.move_vel, -0.05, 0.0, 0.0)
-    side.call(navigation.move_stop)
+    assert side.call(navigation.move_vel, 0.05, 0.0, 0.1) == ""
+    assert side.call(navigation.move_vel, -0.05, 0.0, 0.0) == ""
+    assert side.call(navigation.move_stop) == ""
     side.call(navigation.move_stop)
 
 

@@ -82,6 +82,20 @@ def test_an_obstacle_ahead_stops_a_walk_and_is_named(half):
         half.world.removeObject("carton")
 
 
+def test_what_stops_a_walk_with_a_velocity_is_told_with_the_next_reply(half):
+    client = half.client("""
+tell(navigation.move_vel(0.08, 0.0, 0.0))
+sys.stdin.readline()
+tell(navigation.move_stop())
+tell(navigation.move_stop())
+""")
+    half.until_walking()
+    half.world.touch("LeftBumper", 0.5)
+    half.until(half.still)
+    client.say("stop")
+    assert client.rest() == ["", "cannot walk: the bumper of the left foot is pressed; step back", ""]
+
+
 def test_a_walk_with_a_velocity_starts_from_stand_init_and_does_not_block(half):
     posture, start = half.connection.service("ALRobotPosture"), half.world.getRobotPose()
     assert posture.goToPosture("Sit", 1.0)

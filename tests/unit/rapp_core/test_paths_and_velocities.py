@@ -113,6 +113,19 @@ def test_a_hazard_stops_move_vel_and_is_told_in_the_trace(bench: Bench, words: s
     assert bench.messages()[-1].startswith("core: rapp_move_vel: cannot walk")
 
 
+def test_what_has_ended_move_vel_is_told_its_caller_once_and_nobody_else(bench: Bench) -> None:
+    drive(bench)
+    bench.clock.at(3.0, lambda: bench.fake.feeling.feel(sonar=(0.25, math.inf)))
+    bench.go_on()
+    mine, bench.cut = bench.cut, bench.clock.event()
+    assert bench.call("rapp_move_stop") == {"message": ""}
+    bench.cut = mine
+    assert bench.call("rapp_move_vel", x=0.0, y=0.0, theta=0.2)["message"].startswith("cannot walk: there is an obstacle 0.25 m")
+    bench.clock.after(1.0, lambda: bench.call("rapp_move_stop"))
+    bench.go_on()
+    assert bench.call("rapp_move_stop") == {"message": ""}
+
+
 @pytest.mark.parametrize("wrong", [{"x": 0.11}, {"x": -0.11}, {"y": 0.07}, {"theta": 0.6}])
 def test_a_velocity_beyond_the_limits_is_refused_and_the_limits_named(bench: Bench, wrong: dict[str, float]) -> None:
     with pytest.raises(Refused, match=rf"with {next(iter(wrong))} .* are allowed"):

@@ -30,11 +30,11 @@ class CoreAgent(Protocol):
     def move_to(self, x: float, y: float, theta: float) -> None:
         """Walk to a pose in the frame of the start, m, m, rad."""
 
-    def move_vel(self, x: float, y: float, theta: float) -> None:
-        """Begin to walk with a velocity, m/s, m/s, rad/s."""
+    def move_vel(self, x: float, y: float, theta: float) -> str:
+        """Begin to walk with a velocity, m/s, m/s, rad/s; gives why the last such walk has ended by itself."""
 
-    def move_stop(self) -> None:
-        """Stop all motion."""
+    def move_stop(self) -> str:
+        """Stop all motion; gives why the last walk with a velocity has ended by itself."""
 
     def move_joint(self, joints: Sequence[str], angles: Sequence[float], speed: float) -> None:
         """Move joints to angles, rad; `speed` is a share, 0 for the core agent's own."""

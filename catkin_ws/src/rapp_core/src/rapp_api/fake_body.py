@@ -74,19 +74,21 @@ class FakeBody:
         _check(_finite(x, y, theta), "walk there: x, y and theta must be numbers")
         self._walk([Pose(x, y, theta, "base_link")])
 
-    def move_vel(self, x: float, y: float, theta: float) -> None:
-        """Note the velocity; no time passes."""
+    def move_vel(self, x: float, y: float, theta: float) -> str:
+        """Note the velocity; no time passes, so nothing has ended the walk before."""
         self._begin("rapp_move_vel", "move_vel", (x, y, theta))
         _check(_finite(x, y, theta), "walk so: x, y and theta must be numbers")
         for (name, most), value in zip(FASTEST.items(), (x, y, theta), strict=True):
             if abs(value) > most:
                 raise Refused(f"cannot walk with {name} {value:g}: -{most:g} to {most:g} are allowed")
         self.posture, self.velocity = "StandInit", (x, y, theta)
+        return ""
 
-    def move_stop(self) -> None:
+    def move_stop(self) -> str:
         """Walk no more."""
         self._begin("rapp_move_stop", "move_stop", None)
         self.velocity = (0.0, 0.0, 0.0)
+        return ""
 
     def move_joint(self, joints: Sequence[str], angles: Sequence[float], speed: float) -> None:
         """Have the joints there."""

@@ -22,17 +22,18 @@ def move_to(x: float, y: float, theta: float) -> None:
     current().move_to(x, y, theta)
 
 
-def move_vel(x: float, y: float, theta: float) -> None:
+def move_vel(x: float, y: float, theta: float) -> str:
     """Walk with a velocity, m/s, m/s, rad/s; returns at once. The robot takes StandInit first when it is not in it.
 
     It walks until the next motion of its legs, `move_stop`, or the end of this RApp; a further call only changes the velocity.
+    When the core agent stops it, or the robot itself, the next `move_vel` or `move_stop` gives why; else they give "".
     """
-    current().move_vel(x, y, theta)
+    return current().move_vel(x, y, theta)
 
 
-def move_stop() -> None:
-    """Stop all motion now, of all threads of this RApp."""
-    current().move_stop()
+def move_stop() -> str:
+    """Stop all motion now, of all threads of this RApp; gives what had ended a `move_vel`, if anything had (see there)."""
+    return current().move_stop()
 
 
 def move_joint(joints: str | Sequence[str], angles: float | Sequence[float], speed: float = 0.0) -> None:

@@ -24,13 +24,13 @@ class RosBody(ABC):
         """See `CoreAgent`."""
         self._call("rapp_move_to", "MoveTo", x=x, y=y, theta=theta)
 
-    def move_vel(self, x: float, y: float, theta: float) -> None:
+    def move_vel(self, x: float, y: float, theta: float) -> str:
         """See `CoreAgent`."""
-        self._call("rapp_move_vel", "MoveVel", x=x, y=y, theta=theta)
+        return str(self._call("rapp_move_vel", "MoveVel", x=x, y=y, theta=theta).message)
 
-    def move_stop(self) -> None:
+    def move_stop(self) -> str:
         """See `CoreAgent`."""
-        self._call("rapp_move_stop", "MoveStop")
+        return str(self._call("rapp_move_stop", "MoveStop").message)
 
     def move_joint(self, joints: Sequence[str], angles: Sequence[float], speed: float) -> None:
         """See `CoreAgent`."""

@@ -35,8 +35,12 @@ const SERVICES = {
   },
   navigation: {
     moveTo: { service: "rapp_move_to", parameters: { x: NEEDED, y: NEEDED, theta: NEEDED } },
-    moveVel: { service: "rapp_move_vel", parameters: { x: NEEDED, y: NEEDED, theta: NEEDED } },
-    moveStop: { service: "rapp_move_stop", parameters: {} },
+    moveVel: {
+      service: "rapp_move_vel",
+      parameters: { x: NEEDED, y: NEEDED, theta: NEEDED },
+      give: (response) => response.message,
+    },
+    moveStop: { service: "rapp_move_stop", parameters: {}, give: (response) => response.message },
     moveJoint: {
       service: "rapp_move_joint",
       parameters: { joints: NEEDED, angles: NEEDED, speed: 0 },

@@ -53,6 +53,7 @@ class Calls:
         self._lock = threading.Lock()
         self._open: list[tuple[Call, frozenset[str]]] = []
         self._before: str | None = None
+        self._end: tuple[object, str] | None = None
 
     @contextmanager
     def entered(self, call: Call, limbs: Sequence[str]) -> Iterator[None]:
@@ -90,6 +91,17 @@ class Calls:
     def keep_before(self, posture: str) -> None:
         """The robot has not come back to a posture that was taken from here; whatever was noted since counts less."""
         self._before = posture
+
+    def note_end(self, caller: object, reason: str) -> None:
+        """What went on for a caller after its reply has ended by itself; the last one counts."""
+        self._end = (caller, reason)
+
+    def take_end(self, caller: object) -> str:
+        """Why what went on for a caller has ended by itself, told once; "" when it has not."""
+        if self._end is None or self._end[0] is not caller:
+            return ""
+        (_caller, reason), self._end = self._end, None
+        return reason
 
     def _now(self) -> list[tuple[Call, frozenset[str]]]:
         with self._lock:

@@ -4,7 +4,7 @@ from rapp_agent import Behaviour, Edge, Machine, Subsystem
 from rapp_core.body_ports import Movement, Pose2D
 from rapp_core.errors import Invalid, Refused
 from rapp_core.geometry import finite
-from rapp_core.services.context import Context, request
+from rapp_core.services.context import Context, reply, request
 from rapp_core.services.moving import FEELING, Every, motion, refuse_hazard, refuse_what_ended, standing_up
 from rapp_core.services.reflexes import lasting
 
@@ -31,6 +31,7 @@ def machine(context: Context) -> Machine:
     def look(share: Subsystem) -> None:
         check(context, share)
         refuse_hazard(context, lasting(_velocity(share)))
+        reply(share, message=context.calls.take_end(context.cut))
 
     return Machine("rapp_move_vel", {"check": Behaviour("check", look, label="check")}, "check", [], ["check"])
 

@@ -150,6 +150,8 @@ class Executor:
             except CoreError as error:
                 _log.info("%s: %s", service.name, error)
                 context.trace.note(f"{service.name}: {error}")
+                if not context.call.ended and not context.cut.is_set():
+                    context.calls.note_end(context.cut, str(error))
             finally:
                 with self._lock:
                     if self._going.get(service.name) is entry:
