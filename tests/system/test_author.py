@@ -1,5 +1,6 @@
 """An author's first quarter of an hour: a new RApp runs in the simulator at once, and a broken one says where it broke."""
 
+import json
 import os
 import signal
 import subprocess
@@ -38,6 +39,19 @@ def test_a_new_rapp_runs_at_once_and_a_broken_one_tells_where(tmp_path: Path) ->
     assert ran.returncode == 1
     assert "FAILED" in ran.stdout and "nobody" in ran.stdout
     assert processes_of(tmp_path) == []
+
+
+def test_a_rapp_without_english_keywords_is_asked_for_by_a_sentence_or_in_its_language(tmp_path: Path) -> None:
+    assert rapp(tmp_path, "new", "my_first").returncode == 0
+    package = tmp_path / "my_first" / "package.json"
+    manifest = json.loads(package.read_text())
+    manifest["rapp"] |= {"keywords": {"pl": ["dzień dobry"]}, "sentences": {"en": ["please greet the whole family"]}}
+    package.write_text(json.dumps(manifest))
+    for words in ([], ["--say", "dzień dobry"]):
+        ran = rapp(tmp_path, "run", "my_first", *words)
+        assert ran.returncode == 0, ran.stdout[-3000:] + ran.stderr
+        assert "says  “hello Maria, this is my first”" in ran.stdout
+        assert ("core->link interpret" in ran.stdout, "hears “dzień dobry”" in ran.stdout) == (not words, bool(words))
 
 
 def test_so_does_one_in_javascript(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 import asyncio
+import json
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -10,13 +11,16 @@ from typing import Any
 
 import pytest
 
+from fakes.packages import manifest
+from rapp_cli.errors import UsageError
 from rapp_cli.person import Person
 from rapp_cli.store import new, trial
 from rapp_cli.timeline import Entry
+from rapp_hop.hz.manifest import parse_manifest
 
 Told = tuple[str, str, str, str]
 LISTENS = [("core", "s3", "entered", "listen")]
-HEARS = [("core", "s3", "heard", "greeter"), ("core", "s4", "entered", "keyword")]
+HEARS = [("core", "s3", "heard", "greeter"), ("core", "s4", "entered", "keyword"), ("core", "s6", "entered", "download")]
 STARTS = [("core", "s8", "entered", "await first word"), ("dynamic", "s2", "entered", "initialise")]
 RUNS = [("core", "s9", "entered", "await and execute commands")]
 FAILS = [("dynamic", "execute", "failed", "ValueError: boom")]
@@ -113,3 +117,46 @@ def test_one_that_does_what_it_shall_has_ended_well(
 
 def test_an_answer_is_for_the_rapp_and_not_for_a_robot_that_is_ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert tried(tmp_path, monkeypatch, [*STARTS, *RUNS], asks="what is your name?", answers=["Eva"]) == 0
+
+
+KEYWORD, SENTENCE, POLISH = {"en": ["hi", "hello"]}, {"en": ["greet me please", "say hello"]}, {"pl": ["dzień dobry"]}
+
+
+def request(keywords: dict[str, list[str]], sentences: dict[str, list[str]], wanted: str | None) -> tuple[str, str]:
+    """What the person says for such a RApp, and in which language."""
+    return trial._request(parse_manifest(json.dumps(manifest(keywords=keywords, sentences=sentences)).encode()), wanted)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "sentences", "wanted", "said"),
+    [
+        ({**POLISH, **KEYWORD}, SENTENCE, None, ("hi", "en")),
+        ({**POLISH, **KEYWORD}, SENTENCE, "hello", ("hello", "en")),
+        (KEYWORD, SENTENCE, "say hello to all of us", ("say hello to all of us", "en")),
+        ({}, SENTENCE, None, ("greet me please", "en")),
+        (POLISH, SENTENCE, None, ("greet me please", "en")),
+        (POLISH, SENTENCE, "dzień dobry", ("dzień dobry", "pl")),
+        (POLISH, {}, None, ("dzień dobry", "pl")),
+        ({"xx": ["blah"], **POLISH}, {"pl": ["proszę się przywitać"]}, None, ("dzień dobry", "pl")),
+    ],
+)
+def test_what_can_be_published_can_be_tried(
+    keywords: dict[str, list[str]], sentences: dict[str, list[str]], wanted: str | None, said: tuple[str, str]
+) -> None:
+    assert request(keywords, sentences, wanted) == said
+
+
+@pytest.mark.parametrize(
+    ("keywords", "sentences", "wanted"),
+    [
+        (KEYWORD, {}, "helo"),
+        ({}, {"pl": ["proszę się przywitać"]}, None),
+        ({"xx": ["blah"]}, {}, None),
+        ({"xx": ["blah"]}, {}, "blah"),
+    ],
+)
+def test_what_the_simulated_robot_cannot_hear_names_the_next_step(
+    keywords: dict[str, list[str]], sentences: dict[str, list[str]], wanted: str | None
+) -> None:
+    with pytest.raises(UsageError, match="give it a keyword, or an English sentence"):
+        request(keywords, sentences, wanted)

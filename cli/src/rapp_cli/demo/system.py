@@ -52,6 +52,10 @@ async def running_system(config: DemoConfig, rapps: Sequence[Path] | None = None
         words = [str(ROBOT_SCRIPTS / "robot"), "--home", str(config.folder / "robot"), "--name", ROBOT_NAME]
         if config.robot:
             words += ["--robot", config.robot]
+        if config.language != "en":
+            settings = config.folder / "core_agent.toml"
+            settings.write_text(f'language = "{config.language}"\n')
+            words += ["--config", str(settings)]
         if config.silent:
             words += ["--microphone", "text", "--voice", "silent"]
         env = {**confided(os.environ, LINK), **link_environment(cloud, account)}
