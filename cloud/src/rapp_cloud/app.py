@@ -138,7 +138,7 @@ def _metrics(robots: Robots, agents: CloudAgents, certificate: Certificate | Non
 def _registry(
     config: CloudConfig, shelf: Shelf, interpreting: Interpreting, robots: Robots, agents: CloudAgents, memory: Memory
 ) -> ServiceRegistry:
-    views = Views(shelf.manifests)
+    views = Views(shelf.believed)
     return ServiceRegistry(
         [
             *presence_services(robots, views),

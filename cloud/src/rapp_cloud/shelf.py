@@ -30,6 +30,7 @@ from rapp_hop.hz.tar import Limits
 __all__ = ["Expiry", "Offer", "Shelf"]
 
 PUBLISHER = "rapp"  # who publishes where nobody else is named
+_NEVER = datetime.max.replace(tzinfo=UTC)
 _log = logging.getLogger(__name__)
 
 
@@ -43,6 +44,7 @@ class Offer:
     sha256: str
     robots: tuple[str, ...]  # names of those it is for; none: all
     yanked: bool = False
+    expired: bool = False  # its publisher's list has run out: robots refuse it until they sign the next one
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,10 @@ class _Seen:
     """What was on offer."""
 
     state: tuple[int, int]  # of the timestamp's file
+    until: datetime  # the first of the lists that are good runs out
     offers: list[Offer]
     manifests: tuple[Manifest, ...]
+    believed: tuple[Manifest, ...]
     files: dict[str, str]  # on offer to everybody: by the package's file name, that of the file here
 
 
@@ -189,6 +193,10 @@ class Shelf:
         """
         return self._look().manifests
 
+    def believed(self) -> tuple[Manifest, ...]:
+        """Do as `manifests`, without the packages whose publisher's list has run out, which robots refuse."""
+        return self._look().believed
+
     def offers(self, *, yanked: bool = False) -> list[Offer]:
         """Return all packages on offer, and those taken off it when wanted; see `manifests`."""
         if not yanked:
@@ -197,11 +205,14 @@ class Shelf:
         return _sorted([*self._offers(lists), *self._yanked(lists)])
 
     def _look(self) -> "_Seen":
-        state, seen = self._state(), self._seen
-        if seen is None or seen.state != state:
-            offers = _sorted(self._offers(self._ledger.read()))
+        state, seen, now = self._state(), self._seen, datetime.now(UTC)
+        if seen is None or seen.state != state or seen.until <= now:
+            lists = self._ledger.read()
+            offers = _sorted(self._offers(lists))
             self._packages.keep()
-            seen = self._seen = _Seen(state, offers, tuple(offer.manifest for offer in offers), _files(offers))
+            until = min((own.expires for own in lists.publishers.values() if own.expires > now), default=_NEVER)
+            believed = tuple(offer.manifest for offer in offers if not offer.expired)
+            seen = self._seen = _Seen(state, until, offers, tuple(offer.manifest for offer in offers), believed, _files(offers))
         return seen
 
     def _state(self) -> tuple[int, int]:
@@ -232,9 +243,10 @@ class Shelf:
 
     def _offers(self, lists: Lists) -> Iterator[Offer]:
         for publisher, targets in [(PUBLISHER, lists.targets), *lists.publishers.items()]:
+            late = targets.expires <= datetime.now(UTC)
             for target in targets.targets.values():
-                robots = tuple((target.custom or {}).get("robots", ()))
-                yield Offer(self._packages.manifest(target), publisher, target.length, target.hashes["sha256"], robots)
+                robots, digest = tuple((target.custom or {}).get("robots", ())), target.hashes["sha256"]
+                yield Offer(self._packages.manifest(target), publisher, target.length, digest, robots, expired=late)
 
     def _yanked(self, lists: Lists) -> Iterator[Offer]:
         for publisher, targets in lists.publishers.items():

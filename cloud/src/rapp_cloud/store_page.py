@@ -64,7 +64,7 @@ def _article(offers: list[Offer]) -> str:
         "May use": _codes((*manifest.permissions.core, *manifest.permissions.cloud)) or "nothing",
         "Cloud agent": _codes([manifest.partner]) if manifest.partner else "",
         "Made by": escape(manifest.author or "unknown"),
-        "Signed by": escape(newest.publisher),
+        "Signed by": escape(newest.publisher) + (": the list has run out, robots refuse it" if newest.expired else ""),
         "Versions": _codes([offer.manifest.version.text for offer in reversed(offers)]),
     }
     listed = "".join(f"<dt>{name}</dt><dd>{value}</dd>" for name, value in rows.items() if value)

@@ -6,7 +6,7 @@
 import asyncio
 from urllib.parse import parse_qs
 
-from rapp_cloud.shelf import Shelf
+from rapp_cloud.shelf import Offer, Shelf
 from rapp_cloud.views import Once
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.manifest import Manifest
@@ -24,7 +24,8 @@ _HERE = "\0"  # in the list that is kept, for the URL by which the caller reache
 def weblets(shelf: Shelf, scheme: str) -> Mount:
     """Serve the list of packages, the packages, and the search for one; to be read only, by everybody.
 
-    Packages of cloud agents are no weblets of a robot, and not in the list. Nor are those for some robots only.
+    Packages of cloud agents are no weblets of a robot, and not in the list. Nor are those for some robots only, or whose
+    publisher's list has run out.
 
     :param scheme: http or https, as callers reach this platform
     """
@@ -50,7 +51,11 @@ def weblets(shelf: Shelf, scheme: str) -> Mount:
 
 
 def _listed(shelf: Shelf) -> list[Manifest]:
-    return [offer.manifest for offer in shelf.offers() if offer.manifest.agent == "dynamic" and not offer.robots]
+    return [offer.manifest for offer in shelf.offers() if _is_listed(offer)]
+
+
+def _is_listed(offer: Offer) -> bool:
+    return offer.manifest.agent == "dynamic" and not offer.robots and not offer.expired
 
 
 def _asked(visit: Visit) -> str:

@@ -40,7 +40,8 @@ def run(options: argparse.Namespace) -> int:
 def _list(shelf: Shelf, _options: argparse.Namespace) -> int:
     for offer in shelf.offers():
         manifest = offer.manifest
-        print(f"{manifest.name:<24} {manifest.version.text:<12} {manifest.agent:<8} {offer.publisher:<12} {manifest.description}")
+        says = manifest.description + (f"  expired, {offer.publisher} must sign again" if offer.expired else "")
+        print(f"{manifest.name:<24} {manifest.version.text:<12} {manifest.agent:<8} {offer.publisher:<12} {says}")
     return 0
 
 
