@@ -14,7 +14,7 @@ from rapp_bridge.access import Gate
 from rapp_bridge.blocking import Blocking
 from rapp_bridge.calls import Calls
 from rapp_bridge.config import Config
-from rapp_bridge.doorway import Doorway
+from rapp_bridge.doorway import Doorway, Porch
 from rapp_bridge.errors import Invalid
 from rapp_bridge.graph import Graph
 from rapp_bridge.local import Locals
@@ -87,11 +87,7 @@ class Bridge:
         if config.listener >= 0:
             place = {"sock": socket.socket(fileno=config.listener)}
         return await asyncio.get_running_loop().create_server(
-            lambda: Doorway(self._hall),
-            ssl=tls,
-            backlog=CLIENT_BACKLOG,
-            ssl_handshake_timeout=config.entry_timeout if tls else None,
-            **place,
+            lambda: Porch(self._hall, tls) if tls else Doorway(self._hall), backlog=CLIENT_BACKLOG, **place
         )
 
     async def close(self, seconds: float) -> None:

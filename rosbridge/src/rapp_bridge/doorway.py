@@ -1,6 +1,8 @@
 """The WebSocket handshake: whom the bridge lets in."""
 
 import asyncio
+import socket
+import ssl
 from typing import Any
 
 from rapp_bridge import handshake
@@ -15,19 +17,21 @@ MOMENT = 1.0  # s that one who is turned away has to ask, or to read why
 class Doorway(asyncio.Protocol):
     """A connection until its handshake is done; it has a bounded time, and a bounded number of others beside it."""
 
-    def __init__(self, hall: Hall) -> None:
+    def __init__(self, hall: Hall, knock: socket.socket | None = None) -> None:
+        """`knock`: as what it has counted until now, in `Hall.knocking`."""
         self._hall = hall
+        self._knock = knock
         self._head = b""
 
     def connection_made(self, transport: Any) -> None:
         """A client has connected."""
         self._transport = transport
-        config = self._hall.config
+        if self._knock is not None:
+            self._hall.knocking.discard(self._knock)
         self._hall.sockets.add(transport)
-        excess = len(self._hall.sockets) - config.clients
+        excess = self._hall.excess
         self._is_full = excess > 0
-        seconds = min(config.entry_timeout, MOMENT) if self._is_full else config.entry_timeout
-        self._timer = asyncio.get_running_loop().call_later(seconds, self._is_late)
+        self._timer = asyncio.get_running_loop().call_later(_patience(self._hall), self._is_late)
         if excess > CROWD:
             transport.abort()
 
@@ -72,3 +76,39 @@ class Doorway(asyncio.Protocol):
         self._transport.write(error.response)
         self._transport.close()
         self._head = b""
+
+
+class Porch(asyncio.Protocol):
+    """A connection on which TLS is to be spoken first: it counts as any other, and has a bounded time for its handshake."""
+
+    def __init__(self, hall: Hall, tls: ssl.SSLContext) -> None:
+        self._hall = hall
+        self._tls = tls
+
+    def connection_made(self, transport: Any) -> None:
+        """A client has connected; nothing of it has been read yet, so that its socket can be given to TLS."""
+        knock = transport.get_extra_info("socket").dup()
+        transport.abort()
+        self._hall.knocking.add(knock)
+        if self._hall.excess > CROWD:
+            self._forget(knock)
+        else:
+            self._hall.work(self._shake_hands(knock))
+
+    async def _shake_hands(self, knock: socket.socket) -> None:
+        seconds = _patience(self._hall)
+        try:
+            await asyncio.get_running_loop().connect_accepted_socket(
+                lambda: Doorway(self._hall, knock), knock, ssl=self._tls, ssl_handshake_timeout=seconds
+            )
+        except OSError:  # it speaks no TLS that we speak, or not in time
+            self._forget(knock)
+
+    def _forget(self, knock: socket.socket) -> None:
+        self._hall.knocking.discard(knock)
+        knock.close()
+
+
+def _patience(hall: Hall) -> float:
+    """Seconds that a connection has to enter."""
+    return min(hall.config.entry_timeout, MOMENT) if hall.excess > 0 else hall.config.entry_timeout

@@ -38,7 +38,13 @@ class Hall:
     changed: Callable[[], None]  # called when a client has come or gone
     clients: dict["Connection", tuple[str, tuple[int, int]]] = field(default_factory=dict)  # to address and time of coming
     sockets: set[Any] = field(default_factory=set)  # all transports, those in their handshake too
+    knocking: set[Any] = field(default_factory=set)  # sockets that do not speak TLS yet
     working: set[asyncio.Task[None]] = field(default_factory=set)  # for clients, those that are gone too
+
+    @property
+    def excess(self) -> int:
+        """Connections above the limit."""
+        return len(self.sockets) + len(self.knocking) - self.config.clients
 
     def limits(self) -> Limits:
         """What a client may hold."""

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from fakes.bridge_certificate import certificate
-from fakes.bridge_neighbours import Peer
+from fakes.bridge_neighbours import PATIENCE, Peer
 from fakes.bridge_wire import BINARY, TurnedAwayError, Wire, framed
 
 TOKEN, OTHER = "the-token-of-one-client", "the-token-of-another-one"
@@ -263,3 +263,36 @@ def test_each_token_opens_its_own(url: str, tls: ssl.SSLContext) -> None:
         other.leave()
 
     asyncio.run(story())
+
+
+def test_who_never_shakes_hands_over_tls_counts_as_a_client(
+    start: Any, own_master: Any, pem: tuple[Path, Path], tls: ssl.SSLContext
+) -> None:
+    """As many as there may be wait for their handshake; those beyond are cut off at once, or in a moment."""
+    words = ["--certfile", pem[0], "--keyfile", pem[1], "--clients", 5, "--entry-timeout", 60]
+    bridge = start("rapp_bridge", "--port", "0", *map(str, words), env=own_master.env)
+    url = f"ws://127.0.0.1:{bridge.ready['port']}"
+
+    async def story() -> None:
+        lorises = [await Wire.connect(url) for _ in range(300)]
+        for loris in lorises[5:]:
+            assert await asyncio.wait_for(loris.reader.read(), PATIENCE) == b""
+        with pytest.raises(TurnedAwayError, match="503"):
+            await Wire.open(url, tls=tls)
+        for loris in lorises:
+            loris.leave()
+        async with asyncio.timeout(PATIENCE):
+            while not await is_served(url, tls):
+                await asyncio.sleep(0.05)
+
+    asyncio.run(story())
+
+
+async def is_served(url: str, tls: ssl.SSLContext) -> bool:
+    try:
+        wire = await Wire.open(url, tls=tls)
+    except TurnedAwayError:
+        return False
+    await wire.settle()
+    wire.leave()
+    return True
