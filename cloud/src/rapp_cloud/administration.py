@@ -15,6 +15,7 @@ from rapp_cloud.config import load_config
 from rapp_cloud.keys import Passphrase, passphrase_from
 from rapp_cloud.memory import Memory, open_memory
 from rapp_cloud.people_commands import add_actions
+from rapp_cloud.witness import operator
 from rapp_hop.errors import Refused
 
 
@@ -72,7 +73,7 @@ def _invite(words: list[str]) -> int:
         raise Refused(f"cannot find {root}: run rapp_cloud init first")
     with _memory(options) as memory:
         print(memory.admission.invite(options.robot, options.hours * 3600, root.read_bytes()))
-        memory.audit.add(_who(), "invite", options.robot)
+        memory.audit.add(operator(), "invite", options.robot)
     return 0
 
 
@@ -84,7 +85,7 @@ def _account(words: list[str]) -> int:
     password = getpass.getpass() if sys.stdin.isatty() else sys.stdin.readline().rstrip("\n")
     with _memory(options) as memory:
         memory.admission.enrol(options.name, options.role, password)
-        memory.audit.add(_who(), "account", options.name, role=options.role)
+        memory.audit.add(operator(), "account", options.name, role=options.role)
     print(f"{options.name} is a {options.role}")
     return 0
 
@@ -103,7 +104,7 @@ def _token(words: list[str]) -> int:
         handle = os.open(options.file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
         with os.fdopen(handle, "w") as file:
             file.write(memory.accounts.give(options.name, options.scope, life, rate=options.rate, quota=options.quota))
-        memory.audit.add(_who(), "token", options.name, scopes=options.scope)
+        memory.audit.add(operator(), "token", options.name, scopes=options.scope)
     print(f"{options.file} has a token of {options.name}")
     return 0
 
@@ -123,7 +124,7 @@ def _revoke(words: list[str]) -> int:
     options = parser.parse_args(words)
     with _memory(options) as memory:
         count = memory.accounts.revoke(options.which)
-        memory.audit.add(_who(), "revoke", options.which, count=count)
+        memory.audit.add(operator(), "revoke", options.which, count=count)
     print(f"{count} revoked")
     return 0 if count else 1
 
@@ -135,7 +136,7 @@ def _person(words: list[str]) -> int:
     with _memory(options) as memory:
         print(options.do(memory, options))
         if options.deed != "person show":
-            memory.audit.add(_who(), options.deed, getattr(options, "person", None) or options.robot)
+            memory.audit.add(operator(), options.deed, getattr(options, "person", None) or options.robot)
     return 0
 
 
@@ -159,11 +160,6 @@ def _audit(words: list[str]) -> int:
 def _memory(options: argparse.Namespace) -> Iterator[Memory]:
     with open_memory(options.data, _database(options.data)) as memory:
         yield memory
-
-
-def _who() -> str:
-    """Who gives the command."""
-    return f"{getpass.getuser()} at the platform"
 
 
 COMMANDS: Mapping[str, Callable[[list[str]], int]] = {
