@@ -17,14 +17,15 @@ def _parser() -> argparse.ArgumentParser:
         sub = commands.add_parser(command.name, help=command.summary, description=command.summary)
         command.add_options(sub)
         sub.set_defaults(run=command.run)
-    help_command = commands.add_parser("help", help="list all commands")
-    help_command.set_defaults(run=lambda _options: _print_help(parser))
+    help_command = commands.add_parser("help", help="list all commands, or show what one of them takes")
+    help_command.add_argument("about", nargs="*", metavar="COMMAND", help="such as up, or cloud account")
+    help_command.set_defaults(run=lambda options: _show_help(parser, options.about))
     return parser
 
 
-def _print_help(parser: argparse.ArgumentParser) -> int:
-    parser.print_help()
-    return 0
+def _show_help(parser: argparse.ArgumentParser, about: Sequence[str]) -> int:
+    options = parser.parse_args([*about, "--help"])  # ends the process, unless the command reads its words itself
+    return int(options.run(options))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

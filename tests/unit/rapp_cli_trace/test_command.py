@@ -40,6 +40,12 @@ def test_both_drawings_lie_beside_the_record(tmp_path: Path, capsys: pytest.Capt
     assert "a_core-)person: “hello”" in (tmp_path / "trace.mmd").read_text()
 
 
+def test_a_home_is_named_as_for_the_other_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path, "hello")
+    assert main(["trace", "--home", str(tmp_path), "--format", "svg"]) == 0
+    assert capsys.readouterr().out.splitlines() == [str(tmp_path / "trace.svg")]
+
+
 @pytest.mark.parametrize("newer", ["demo/1", "demo/2", "home"])
 def test_without_a_folder_the_last_run_is_drawn(data: Path, newer: str, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("demo/1", "demo/2", "home"):

@@ -27,9 +27,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "Draws the last run, from the command until the robot listens again, as a UML sequence diagram of the messages that "
         "were sent. Without --output it writes trace.svg and trace.mmd into the folder."
     )
-    parser.add_argument(
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
         "folder", nargs="?", type=Path, help="of a demo, or the home of ./rapp up (default: where something ran last)"
     )
+    where.add_argument("--home", type=Path, metavar="DIR", help="the same, as for the commands beside this one")
     numbers = ", ".join(map(str, FIGURES))
     parser.add_argument("--figure", type=int, choices=FIGURES, metavar="N", help=f"only what is figure N of the paper: {numbers}")
     parser.add_argument("--format", choices=SUFFIXES, help="only this one")
@@ -38,7 +40,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Draw; gives 0. Raises UsageError, CommandError."""
-    folder = (options.folder or newest(_data())).expanduser().resolve()
+    folder = (options.folder or options.home or newest(_data())).expanduser().resolve()
     items = last_run(read(folder))
     title = f"RAPP, {time.strftime('%Y-%m-%d %H:%M', time.localtime(items[0].time))}"
     if options.figure is not None:

@@ -1,0 +1,26 @@
+"""`./rapp help`."""
+
+import pytest
+
+from rapp_cli.__main__ import main
+from rapp_cli.commands import COMMANDS
+
+
+@pytest.mark.parametrize(
+    ("about", "shown"), [((), [command.name for command in COMMANDS]), (("up",), ["--cloud"]), (("cloud", "account"), ["--role"])]
+)
+def test_help_lists_the_commands_or_shows_what_one_takes(
+    about: tuple[str, ...], shown: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["help", *about])
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert all(word in said for word in shown)
+
+
+def test_help_about_what_is_no_command_names_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["help", "fly"])
+    assert ended.value.code == 2
+    assert "'up'" in capsys.readouterr().err
