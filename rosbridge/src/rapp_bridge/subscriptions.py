@@ -42,6 +42,7 @@ class _Wish:
     queue_length: int
     due: float = float("-inf")
     held: deque[Arrival] = field(default_factory=deque)  # for when they are due
+    timer: asyncio.TimerHandle | None = None
 
     def take(self, arrival: Arrival) -> None:
         """Offer a message to the client, now, when it is due, or not at all."""
@@ -58,18 +59,23 @@ class _Wish:
         if not self.queue_length:
             return
         if not self.held:
-            asyncio.get_running_loop().call_at(self.due, self._release)
+            self.timer = asyncio.get_running_loop().call_at(self.due, self._release)
         self.held.append(arrival)
         if len(self.held) > self.queue_length:
             self.held.popleft()
 
     def _release(self) -> None:
+        loop = asyncio.get_running_loop()
+        self.client.offer(self.held.popleft(), self.wire, self.queue_length)
+        self.due = loop.time() + self.throttle
         if self.held:
-            loop = asyncio.get_running_loop()
-            self.client.offer(self.held.popleft(), self.wire, self.queue_length)
-            self.due = loop.time() + self.throttle
-            if self.held:
-                loop.call_at(self.due, self._release)
+            self.timer = loop.call_at(self.due, self._release)
+
+    def end(self) -> None:
+        """It is over, or another takes its place: what is held comes no more."""
+        self.held.clear()
+        if self.timer is not None:
+            self.timer.cancel()
 
 
 @dataclass(eq=False)
@@ -150,7 +156,8 @@ class Subscriptions:
     def unsubscribe(self, client: Client, wish: Unsubscribe) -> None:
         """Take the client off the topic, if there; without clients the subscriber lives on for a while, see `sweep`."""
         entry = self._subscribed.get(rospy.resolve_name(wish.topic))
-        if entry is not None and entry.wishes.pop((client, wish.topic), None) is not None:
+        if entry is not None and (over := entry.wishes.pop((client, wish.topic), None)) is not None:
+            over.end()
             entry.unused_since = time.monotonic()
 
     async def sweep(self) -> None:
@@ -173,6 +180,8 @@ class Subscriptions:
         if entry.cls is not None and wish.type not in (None, entry.cls._type):
             raise Invalid(f"cannot subscribe to {wish.topic} as {wish.type}: it is {entry.cls._type}; use that type")
         wire = Wire(wish.topic, wish.compression, wish.fragment_size)
+        if (changed := entry.wishes.get((client, wish.topic))) is not None:
+            changed.end()
         new = entry.wishes[client, wish.topic] = _Wish(client, wire, wish.throttle_rate / 1000, wish.queue_length)
         if not wish.again:
             for source in entry.sources.values():

@@ -209,3 +209,31 @@ def test_throttled_subscribers_get_the_first_and_with_a_queue_the_newest_in_orde
             assert (await plain.receive("publish"))["msg"]["data"] == "later"
 
     asyncio.run(story())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"op": "unsubscribe"}, {"op": "subscribe", "type": "std_msgs/String"}],
+    ids=["unsubscribed", "changed"],
+)
+def test_what_a_throttled_subscription_holds_does_not_outlive_it(clients: Clients, change: dict[str, str]) -> None:
+    async def story() -> None:
+        async with clients:
+            listener, speaker = await clients.new(), await clients.new()
+            wish = {"throttle_rate": 300, "queue_length": 10, "type": "std_msgs/String"}
+            await listener.send(op="subscribe", topic="/held_back", **wish)
+            await listener.settle()
+            await speaker.send(op="advertise", topic="/held_back", type="std_msgs/String")
+            for number in range(10):
+                await speaker.send(op="publish", topic="/held_back", msg={"data": str(number)})
+            assert (await listener.receive("publish"))["msg"]["data"] == "0"  # the others are on their way, or held
+            assert (await listener.receive("publish"))["msg"]["data"] == "1"
+            await listener.send(topic="/held_back", **change)
+            await listener.settle()
+            await asyncio.sleep(1)
+            await listener.send(op="subscribe", topic="/held_back", type="std_msgs/String")
+            await listener.settle()
+            await speaker.send(op="publish", topic="/held_back", msg={"data": "new"})
+            assert (await listener.receive("publish"))["msg"]["data"] == "new"
+
+    asyncio.run(story())
