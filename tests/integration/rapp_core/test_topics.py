@@ -3,20 +3,34 @@
 import json
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from rapp_core.robot.naoqi.connection import Connection
+
 LISTENER = str(Path(__file__).with_name("listen_to.py"))
 
 
+PATIENCE = 30.0  # s
+
+
 @pytest.fixture(scope="module")
-def told(start_for_module, ros_env, tmp_path_factory) -> dict[str, Any]:
+def robot(start_for_module, tmp_path_factory) -> Iterator[Connection]:
     home = tmp_path_factory.mktemp("home")
     sim = start_for_module("rapp_nao_sim", "--microphone", "text", "--voice", "silent", "--port", "0", "--files", str(home))
     url = f"tcp://127.0.0.1:{sim.ready['port']}"
     start_for_module("rapp_core", "--robot", url, "--home", str(home))
+    connection = Connection(url, 5.0)
+    yield connection
+    connection.close()
+
+
+@pytest.fixture(scope="module")
+def told(robot, ros_env) -> dict[str, Any]:
     words = [sys.executable, LISTENER]
     done = subprocess.run(words, env=ros_env, capture_output=True, text=True, timeout=100, check=False)
     assert done.returncode == 0, done.stderr
@@ -53,3 +67,11 @@ def test_both_cameras_see_something(told):
 def test_diagnostics_tell_that_all_is_well_but_the_link(told):
     levels = {name: level for name, (level, _message) in told["/diagnostics"].items()}
     assert levels == {"rapp: core agent": 0, "rapp: robot": 0, "rapp: link": 1}
+
+
+def test_what_nobody_listens_to_any_more_is_not_measured_any_more(robot, told):
+    assert told
+    deadline = time.monotonic() + PATIENCE
+    while robot.call("ALSonar", "getSubscribersInfo") or robot.call("ALVideoDevice", "getSubscribers"):
+        assert time.monotonic() < deadline, "sonars or cameras stay on"
+        time.sleep(0.1)

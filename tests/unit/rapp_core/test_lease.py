@@ -54,7 +54,9 @@ def test_release_ends_the_lease_and_cuts_what_runs_for_it(clock: Clock, lease: L
     run = agent(clock, tmp_path)
     lease.grant(run)
     grant = lease.check(run.token)
+    assert lease.held
     lease.release()
+    assert not lease.held
     assert grant.cut.is_set()
     with pytest.raises(Refused):
         lease.check(run.token)

@@ -1,6 +1,7 @@
 """Topics of the body and the cameras: what is measured when, and the messages made of it."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import cv2
@@ -11,6 +12,7 @@ import rospy
 from rapp_core.body_ports import Picture, Pose2D, Senses
 from rapp_core.errors import Unreachable
 from rapp_core.ros.topics import body, camera, diagnostics
+from rapp_core.ros.topics.offer import unless
 from rapp_core.ros.topics.streams import AGAIN, IDLE, Stream, Topic
 
 STAMP = rospy.Time(100, 5)
@@ -39,9 +41,9 @@ class Listeners:
         self.published.append(message)
 
 
-def stream(measure: Any, *topics: Topic) -> Stream:
+def stream(measure: Any, *topics: Topic, idle: Callable[[], None] = lambda: None) -> Stream:
     """A stream that is stepped by hand."""
-    return Stream("probe", 0.04, measure, topics)
+    return Stream("probe", 0.04, measure, topics, idle)
 
 
 def test_nothing_is_measured_without_subscribers() -> None:
@@ -70,6 +72,23 @@ def test_a_robot_that_is_away_is_asked_again_later() -> None:
     listener = Listeners(1)
     assert stream(measure, Topic(listener, str)).step() == AGAIN
     assert not listener.published
+
+
+def test_when_the_last_subscriber_has_gone_the_sense_is_idle_and_once() -> None:
+    idle: list[str] = []
+    first, second = Listeners(0), Listeners(0)
+    probe = stream(lambda: 7, Topic(first, str), Topic(second, str), idle=lambda: idle.append("idle"))
+    for numbers, calls in (((0, 0), 0), ((1, 1), 0), ((0, 1), 0), ((0, 0), 1), ((0, 0), 1), ((1, 0), 1), ((0, 0), 2)):
+        first.number, second.number = numbers
+        probe.step()
+        assert len(idle) == calls
+
+
+def test_the_senses_stay_awake_for_a_rapp() -> None:
+    closed: list[str] = []
+    for held in (True, False):
+        unless(lambda held=held: held, lambda: closed.append("closed"))()  # type: ignore[misc]
+        assert closed == ([] if held else ["closed"])
 
 
 def test_joint_states_name_each_angle() -> None:

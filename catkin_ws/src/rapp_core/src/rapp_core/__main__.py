@@ -92,7 +92,7 @@ def _run(config: Config, launcher: Launcher, stop: threading.Event) -> None:
     RosActions(executor, lease, trace)
     machine, rejoining = core_machine(control), Rejoining()
     machine.listen(trace.core_event)
-    topics = streams(nao, hop, trace, lambda: context.place.odom, config)
+    topics = streams(nao, hop, trace, lambda: context.place.odom, lambda: lease.held, config)
     for stream in topics:
         stream.start()
     threading.Thread(target=_hush_at_end, args=(nao.voice, stop), name="hush", daemon=True).start()

@@ -34,6 +34,11 @@ class Lease:
         self._grant: Grant | None = None
         self._looked = self._back = now()  # when `problem` was last asked, and first after the core agent stood still
 
+    @property
+    def held(self) -> bool:
+        """Whether a run holds it."""
+        return self._grant is not None
+
     def grant(self, run: Agent) -> None:
         """Give the lease to a run; whoever held it before holds it no more."""
         self.release()

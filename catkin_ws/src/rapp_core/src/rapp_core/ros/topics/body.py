@@ -36,7 +36,9 @@ class Felt:
     stamp: Any  # rospy.Time
 
 
-def body_stream(motion: Motion, feeling: Feeling, odom_in_map: Callable[[], Pose2D], period: float) -> Stream:
+def body_stream(
+    motion: Motion, feeling: Feeling, odom_in_map: Callable[[], Pose2D], period: float, idle: Callable[[], None]
+) -> Stream:
     """Topics in the robot's namespace, and /tf; `period` in s."""
 
     def measure() -> Felt:
@@ -54,7 +56,7 @@ def body_stream(motion: Motion, feeling: Feeling, odom_in_map: Callable[[], Pose
     for side in SIDES:
         topics.append(topic(f"sonar/{side}", Range, partial(sonar, side)))
         topics.append(topic(f"bumper/{side}", Bool, partial(bumper, side)))
-    return Stream("body", period, measure, topics)
+    return Stream("body", period, measure, topics, idle)
 
 
 def joint_state(felt: Felt) -> JointState:

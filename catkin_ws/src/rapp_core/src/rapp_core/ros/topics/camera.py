@@ -1,6 +1,7 @@
 """image_raw, its compressed form and camera_info of each camera (sensor_msgs; REP 104)."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import cv2
@@ -16,7 +17,7 @@ FIELD_OF_VIEW = (math.radians(60.97), math.radians(47.64))  # across, down: NAO 
 QUALITY = 80  # of JPEG, percent
 
 
-def camera_stream(camera: Camera, name: str, resolution: int, period: float) -> Stream:
+def camera_stream(camera: Camera, name: str, resolution: int, period: float, idle: Callable[[], None]) -> Stream:
     """Topics camera/NAME/image_raw, image_raw/compressed and camera_info; `name` is top or bottom, `period` in s."""
     frame = f"camera_{name}_optical_frame"
 
@@ -29,7 +30,7 @@ def camera_stream(camera: Camera, name: str, resolution: int, period: float) -> 
         topic("image_raw/compressed", CompressedImage, compressed),
         topic("camera_info", CameraInfo, camera_info),
     ]
-    return Stream(f"camera {name}", period, lambda: camera.capture(name, resolution), topics)
+    return Stream(f"camera {name}", period, lambda: camera.capture(name, resolution), topics, idle)
 
 
 def image(picture: Picture, frame: str) -> Image:

@@ -25,7 +25,9 @@ class Health:
     link: bool
 
 
-def diagnostics_stream(feeling: Feeling, robot: Callable[[], bool], link: Callable[[], bool], state: Callable[[], str]) -> Stream:
+def diagnostics_stream(
+    feeling: Feeling, robot: Callable[[], bool], link: Callable[[], bool], state: Callable[[], str], idle: Callable[[], None]
+) -> Stream:
     """The topic, once per second."""
 
     def measure() -> Health:
@@ -36,7 +38,7 @@ def diagnostics_stream(feeling: Feeling, robot: Callable[[], bool], link: Callab
         return Health(state(), robot(), senses.battery, senses.fallen, link())
 
     publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=5)
-    return Stream("diagnostics", PERIOD, measure, [Topic(publisher, lambda health: array(health, rospy.Time.now()))])
+    return Stream("diagnostics", PERIOD, measure, [Topic(publisher, lambda health: array(health, rospy.Time.now()))], idle)
 
 
 def array(health: Health, stamp: rospy.Time) -> DiagnosticArray:

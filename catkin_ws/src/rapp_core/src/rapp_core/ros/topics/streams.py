@@ -38,12 +38,19 @@ class Topic:
 class Stream:
     """A measurement that feeds topics: one thread, which measures once per period, and only while a topic is wanted."""
 
-    def __init__(self, name: str, period: float, measure: Callable[[], Any], topics: Sequence[Topic]) -> None:
-        """Prepare; `period` in s. `measure` may raise CoreError: then it is tried again later."""
+    def __init__(
+        self, name: str, period: float, measure: Callable[[], Any], topics: Sequence[Topic], idle: Callable[[], None]
+    ) -> None:
+        """Prepare; `period` in s. `measure` may raise CoreError: then it is tried again later.
+
+        `idle` is called when the last subscriber has gone.
+        """
         self._name = name
         self._period = period
         self._measure = measure
         self._topics = tuple(topics)
+        self._idle = idle
+        self._wanted = False
         self._stop = threading.Event()
         self._lost = False
         self._thread = threading.Thread(target=self._run, name=f"stream {name}", daemon=True)
@@ -66,7 +73,11 @@ class Stream:
         """Measure and publish what is wanted; gives the s until the next step."""
         wanted = [topic for topic in self._topics if topic.wanted]
         if not wanted:
+            if self._wanted:
+                self._idle()
+            self._wanted = False
             return IDLE
+        self._wanted = True
         try:
             measured = self._measure()
         except CoreError as error:
