@@ -1,6 +1,7 @@
 """From what the agents publish to the phases of one activation (pure: no process, no clock)."""
 
 import itertools
+import re
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ SOUND_ENDED = "end of sound noticed"
 TAKEN = "word recognised, or command recorded"
 UNDERSTOOD = "RApp known"
 DOWNLOADING = "download begun"
+DOWNLOADED = "package downloaded"
 VERIFIED = "package verified"
 INSTALLED = "package installed"
 ACTIVATING = "activation begun"
@@ -17,9 +19,11 @@ FIRST_WORD = "agent's first line"
 FIRST_CALL = "first core service call"
 
 ORDER = (
-    SPEECH_ENDED, SOUND_ENDED, TAKEN, UNDERSTOOD, DOWNLOADING, VERIFIED, INSTALLED, ACTIVATING, FIRST_WORD, FIRST_CALL,
+    SPEECH_ENDED, SOUND_ENDED, TAKEN, UNDERSTOOD, DOWNLOADING, DOWNLOADED, VERIFIED, INSTALLED, ACTIVATING, FIRST_WORD,
+    FIRST_CALL,
 )  # fmt: skip
 """Marks on the way, in their order; those of a download are missing when the RApp is installed."""
+_PACKAGE_CAME = re.compile(r"repository->link reply GET \S+\.hz( from byte \d+)?")
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,8 @@ def _mark(stamp: Stamp) -> str | None:
         return None
     if stamp.detail.startswith("dynamic->core rapp_"):
         return FIRST_CALL
+    if _PACKAGE_CAME.fullmatch(stamp.detail):
+        return DOWNLOADED
     return {
         "link->core downloading (asynchronous)": DOWNLOADING,
         "link->core verified (asynchronous)": VERIFIED,

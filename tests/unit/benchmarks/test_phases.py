@@ -4,6 +4,7 @@ import pytest
 
 from benchmarks.phases import (
     ACTIVATING,
+    DOWNLOADED,
     DOWNLOADING,
     FIRST_CALL,
     FIRST_WORD,
@@ -42,6 +43,8 @@ INSTALLED_RAPP = [
 DOWNLOAD = [
     message(10.72, "link->core downloading (asynchronous)"),
     message(10.73, "link->core downloading (asynchronous)"),
+    message(10.731, "repository->link reply GET targets.json"),
+    message(10.735, "repository->link reply GET clock-1.0.0.hz"),
     message(10.74, "link->core verified (asynchronous)"),
     message(10.75, "link->core installed (asynchronous)"),
 ]
@@ -62,7 +65,7 @@ def test_installed_rapp_has_no_marks_of_a_download() -> None:
 
 def test_fresh_rapp_has_the_first_of_each_mark() -> None:
     found = marks(10.0, [10.5], INSTALLED_RAPP + DOWNLOAD)
-    assert (found[DOWNLOADING], found[VERIFIED], found[INSTALLED]) == (10.72, 10.74, 10.75)
+    assert (found[DOWNLOADING], found[DOWNLOADED], found[VERIFIED], found[INSTALLED]) == (10.72, 10.735, 10.74, 10.75)
 
 
 def test_end_of_sound_is_the_last_before_the_command_was_taken() -> None:
