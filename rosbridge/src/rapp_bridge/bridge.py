@@ -50,7 +50,7 @@ class Bridge:
         self._offers = Offers(config, blocking)
         self._own = Locals(config, blocking, self._offers)
         self._calls = Calls(config, master, blocking, name)
-        self._rosapi = Rosapi(Graph(config, master, blocking, name), master, blocking)
+        self._rosapi = Rosapi(Graph(config, master, blocking, self._offers, name), master, blocking)
         self._presence = Presence(self._publications)
         ros = Ros(config, self._publications, self._subscriptions, self._calls, self._offers, self._own)
         changed = _nothing if config.guest else self._presence.changed

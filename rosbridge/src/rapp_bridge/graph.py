@@ -1,6 +1,7 @@
 """What there is in the ROS graph: nodes, topics, services, parameters, as one client may see them."""
 
 import asyncio
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from rapp_bridge.config import Config
 from rapp_bridge.errors import BridgeError
 from rapp_bridge.links import Outgoing
 from rapp_bridge.master import Entries, Master
+from rapp_bridge.offers import Offers
 
 ACTION_TOPICS = ("goal", "cancel", "status", "feedback", "result")
 ANY = ("*",)
@@ -18,12 +20,13 @@ ANY = ("*",)
 class Graph:
     """Asks the master, and nodes for the types of their services: a node that does not answer delays no answer for long."""
 
-    def __init__(self, config: Config, master: Master, blocking: Blocking, caller: str) -> None:
+    def __init__(self, config: Config, master: Master, blocking: Blocking, offers: Offers, caller: str) -> None:
         self._config = config
+        self._offers = offers
         self._master = master
         self._blocking = blocking
         self._caller = caller
-        self._types: dict[tuple[str, tuple[str, int]], str] = {}  # of services; one that moves is asked anew
+        self._types: dict[tuple[str, tuple[str, int]], tuple[str, float]] = {}  # of services, and when they were asked
 
     async def topics(self, access: Access) -> dict[str, str]:
         """Topics that somebody publishes or subscribes, and their types ("" when not known)."""
@@ -74,10 +77,13 @@ class Graph:
 
     async def service_type(self, service: str) -> str:
         """The type of a service, "" when its node does not answer, or there is none."""
+        if (offered := self._offers.find(service)) is not None:
+            return str(offered.cls._type)
         try:
             address = await self._blocking.run(self._master.service_address, service)
-            kept = self._types.get((service, address))
-            return kept or await self._ask_type(service, address)
+            kind, since = self._types.get((service, address), ("", 0.0))
+            is_fresh = kind and time.monotonic() - since < self._config.connection_age
+            return kind if is_fresh else await self._ask_type(service, address)
         except BridgeError:
             return ""
 
@@ -90,7 +96,7 @@ class Graph:
             link.close()
         if len(self._types) > 10_000:
             self._types.clear()
-        self._types[service, address] = kind
+        self._types[service, address] = kind, time.monotonic()
         return kind
 
     async def _state(self, access: Access) -> tuple[dict[str, list[str]], dict[str, list[str]], dict[str, list[str]]]:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from fakes.bridge_neighbours import PATIENCE, Clients, Peer
+from fakes.bridge_puppet import Puppet, puppet
 from fakes.bridge_workshop import workshop
 
 
@@ -156,3 +157,33 @@ def test_who_is_connected_is_published(clients: Clients, url: str) -> None:
             await become(2)
 
     asyncio.run(story())
+
+
+def test_the_type_of_a_service_is_that_of_the_moment(clients: Clients) -> None:
+    async def story() -> None:
+        async with clients:
+            asking = await clients.new()
+            for kind in ("std_srvs/Empty", "std_srvs/Trigger"):
+                provider = await clients.new()
+                await provider.send(op="advertise_service", service="/changing", type=kind)
+                await provider.settle()
+                assert (await asking.call("/rosapi/service_type", args=["/changing"]))["values"] == {"type": kind}
+                assert "/changing" in (await asking.call("/rosapi/services_for_type", args=[kind]))["values"]["services"]
+
+    asyncio.run(story())
+
+
+def test_the_type_of_a_node_s_service_is_asked_again_after_a_while(start: Any, own_master: Any) -> None:
+    async def story(clients: Clients, changing: Puppet) -> None:
+        async with clients:
+            asking = await clients.new()
+            for kind in ("Empty", "Trigger"):
+                changing.do(f"service = rospy.Service('/changing', {kind}, lambda request: None)")
+                async with asyncio.timeout(PATIENCE):
+                    while (await asking.call("/rosapi/service_type", args=["/changing"]))["values"]["type"] != f"std_srvs/{kind}":
+                        await asyncio.sleep(0.05)
+                changing.do("service.shutdown()")
+
+    with puppet(own_master.env, "changing") as node:
+        bridge = start("rapp_bridge", "--port", "0", "--connection-age", "0.5", env=own_master.env)
+        asyncio.run(story(Clients(f"ws://127.0.0.1:{bridge.ready['port']}"), node))
