@@ -74,6 +74,16 @@ def test_a_robot_that_is_away_is_asked_again_later() -> None:
     assert not listener.published
 
 
+def test_an_odd_answer_is_logged_once_and_does_not_end_the_topics(caplog: pytest.LogCaptureFixture) -> None:
+    answers: list[Any] = ["?", "?", 1, "x", 2]
+    number, text = Listeners(1), Listeners(1)
+    probe = stream(lambda: answers.pop(0), Topic(number, int), Topic(text, str))
+    assert [probe.step() for _ in range(5)] == [0.04] * 5
+    assert probe.step() == 0.04  # nothing is left to measure
+    assert (number.published, text.published) == ([1, 2], ["?", "?", "1", "x", "2"])
+    assert [type(record.exc_info[1]) for record in caplog.records if record.exc_info] == [ValueError, IndexError]
+
+
 def test_when_the_last_subscriber_has_gone_the_sense_is_idle_and_once() -> None:
     idle: list[str] = []
     first, second = Listeners(0), Listeners(0)

@@ -53,6 +53,7 @@ class Stream:
         self._wanted = False
         self._stop = threading.Event()
         self._lost = False
+        self._bugs: set[type[Exception]] = set()  # those that have been logged
         self._thread = threading.Thread(target=self._run, name=f"stream {name}", daemon=True)
 
     def start(self) -> None:
@@ -83,10 +84,21 @@ class Stream:
         except CoreError as error:
             self._note(error)
             return AGAIN
+        except Exception as error:  # noqa: BLE001 - an odd answer of the robot must not end the topics for ever
+            self._note_bug(error)
+            return self._period
         self._note(None)
         for topic in wanted:
-            topic.publisher.publish(topic.message(measured))
+            try:
+                topic.publisher.publish(topic.message(measured))
+            except Exception as error:  # noqa: BLE001 - nor the other topics
+                self._note_bug(error)
         return self._period
+
+    def _note_bug(self, error: Exception) -> None:
+        if type(error) not in self._bugs:
+            self._bugs.add(type(error))
+            _log.error("%s: a measurement is left out for a fault of ours; report it with this log", self._name, exc_info=error)
 
     def _note(self, error: CoreError | None) -> None:
         if error is not None and not self._lost:
