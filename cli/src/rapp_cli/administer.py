@@ -16,4 +16,4 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do it."""
-    return main([options.action, "--data", str(data_of(options)), *options.words])
+    return main([options.action, *options.words], "./rapp cloud", data_of(options))

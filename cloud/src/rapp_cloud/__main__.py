@@ -12,7 +12,7 @@ from pathlib import Path
 
 import uvloop
 
-from rapp_cloud.administration import COMMANDS
+from rapp_cloud.administration import COMMANDS, administer
 from rapp_cloud.app import open_shelf, running_cloud
 from rapp_cloud.config import PREFIX, CloudConfig, load_config
 from rapp_cloud.files import write_whole
@@ -27,15 +27,17 @@ from rapp_hop.hz.text import check_name
 _OPEN_FILES = 65536  # connections, files on their way and pipes of one platform
 
 
-def main(words: list[str] | None = None) -> int:
-    """Run the command that the words name; return its exit status."""
+def main(words: list[str] | None = None, program: str = "python -m rapp_cloud", data: Path | None = None) -> int:
+    """Run the command that the words name; return its exit status. For program and data see `administer`."""
     words = sys.argv[1:] if words is None else words
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s")
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # what is in our memory must not lie about on the disk
-    commands = {"init": _init, "publish": _publish, **COMMANDS}
+    commands = {"init": _init, "publish": _publish}
     try:
         if words and words[0] in commands:
             return commands[words[0]](words[1:])
+        if words and words[0] in COMMANDS:
+            return administer(words, program, data)
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             return runner.run(_serve(_options(words)))
     except HopError as error:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from rapp_cloud.backup import back_up, passphrase_of, restore
@@ -18,10 +19,13 @@ from rapp_cloud.people_commands import add_actions
 from rapp_cloud.witness import operator
 from rapp_hop.errors import Refused
 
+Make = Callable[[str, str], argparse.ArgumentParser]
+"""Makes a command's parser, from its name and what it is for."""
 
-def _parser(command: str, description: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(f"python -m rapp_cloud {command}", description=description)
-    parser.add_argument("--data", type=Path, required=True, metavar="DIR", help="the platform's folder")
+
+def _parser(program: str, data: Path | None, command: str, description: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(f"{program} {command}", description=description)
+    parser.add_argument("--data", type=Path, required=data is None, default=data, metavar="DIR", help="the platform's folder")
     return parser
 
 
@@ -29,8 +33,8 @@ def _database(data: Path) -> str | None:
     return load_config(data, {}, os.environ).database
 
 
-def _backup(words: list[str]) -> int:
-    parser = _parser(
+def _backup(make: Make, words: list[str]) -> int:
+    parser = make(
         "backup", "Write all that a platform keeps into one file; its secrets too, but not the passphrase of the store's keys."
     )
     parser.add_argument("file", type=Path, metavar="FILE")
@@ -43,8 +47,8 @@ def _backup(words: list[str]) -> int:
     return 0
 
 
-def _restore(words: list[str]) -> int:
-    parser = _parser("restore", "Make a platform of a back-up, in an empty folder and an empty database.")
+def _restore(make: Make, words: list[str]) -> int:
+    parser = make("restore", "Make a platform of a back-up, in an empty folder and an empty database.")
     parser.add_argument("file", type=Path, metavar="FILE")
     options = parser.parse_args(words)
     done = restore(options.data, _database(options.data), options.file, passphrase_from(os.environ))
@@ -63,8 +67,8 @@ def refused_until_renewed(package: str) -> str:
     return f"robots refuse {package}: its list has expired, its publisher must run ./rapp store renew --cloud URL"
 
 
-def _invite(words: list[str]) -> int:
-    parser = _parser("invite", "Print a code by which a robot may come in, once.")
+def _invite(make: Make, words: list[str]) -> int:
+    parser = make("invite", "Print a code by which a robot may come in, once.")
     parser.add_argument("robot", metavar="ROBOT")
     parser.add_argument("--hours", type=float, default=24.0, help="that the code is good (%(default)g)")
     options = parser.parse_args(words)
@@ -77,8 +81,8 @@ def _invite(words: list[str]) -> int:
     return 0
 
 
-def _account(words: list[str]) -> int:
-    parser = _parser("account", "Make a person's account, or give it another password, which is read from the terminal or stdin.")
+def _account(make: Make, words: list[str]) -> int:
+    parser = make("account", "Make a person's account, or give it another password, which is read from the terminal or stdin.")
     parser.add_argument("name", metavar="NAME")
     parser.add_argument("--role", choices=("user", "publisher"), default="user")
     options = parser.parse_args(words)
@@ -90,8 +94,8 @@ def _account(words: list[str]) -> int:
     return 0
 
 
-def _token(words: list[str]) -> int:
-    parser = _parser("token", "Make a token and write it into a file.")
+def _token(make: Make, words: list[str]) -> int:
+    parser = make("token", "Make a token and write it into a file.")
     parser.add_argument("name", metavar="NAME", help="whose")
     parser.add_argument("file", type=Path, metavar="FILE", help="to write it to; must not be there")
     parser.add_argument("--scope", action="append", default=[], help="what it allows (all that its holder may); may be repeated")
@@ -109,8 +113,8 @@ def _token(words: list[str]) -> int:
     return 0
 
 
-def _tokens(words: list[str]) -> int:
-    options = _parser("tokens", "List the tokens: id, whose, what they allow, until when.").parse_args(words)
+def _tokens(make: Make, words: list[str]) -> int:
+    options = make("tokens", "List the tokens: id, whose, what they allow, until when.").parse_args(words)
     with _memory(options) as memory:
         for one in memory.accounts.list():
             until = f"until {datetime.fromtimestamp(one.expires, UTC):%F %R}" if one.expires else ""
@@ -118,8 +122,8 @@ def _tokens(words: list[str]) -> int:
     return 0
 
 
-def _revoke(words: list[str]) -> int:
-    parser = _parser("revoke", "Take back a token by its id, or all tokens of an account.")
+def _revoke(make: Make, words: list[str]) -> int:
+    parser = make("revoke", "Take back a token by its id, or all tokens of an account.")
     parser.add_argument("which", metavar="ID|NAME")
     options = parser.parse_args(words)
     with _memory(options) as memory:
@@ -129,8 +133,8 @@ def _revoke(words: list[str]) -> int:
     return 0 if count else 1
 
 
-def _person(words: list[str]) -> int:
-    parser = _parser("person", "The persons of a home: what they are called, whom they write to, which robots serve them.")
+def _person(make: Make, words: list[str]) -> int:
+    parser = make("person", "The persons of a home: what they are called, whom they write to, which robots serve them.")
     add_actions(parser)
     options = parser.parse_args(words)
     with _memory(options) as memory:
@@ -140,8 +144,8 @@ def _person(words: list[str]) -> int:
     return 0
 
 
-def _audit(words: list[str]) -> int:
-    parser = _parser("audit", "Show the audit log; with --check, look whether it was changed.")
+def _audit(make: Make, words: list[str]) -> int:
+    parser = make("audit", "Show the audit log; with --check, look whether it was changed.")
     parser.add_argument("--last", type=int, default=100, metavar="N", help="entries (%(default)s)")
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--seal", default="", help="that must be in it, such as the last of the platform's log")
@@ -162,8 +166,17 @@ def _memory(options: argparse.Namespace) -> Iterator[Memory]:
         yield memory
 
 
-COMMANDS: Mapping[str, Callable[[list[str]], int]] = {
+COMMANDS: Mapping[str, Callable[[Make, list[str]], int]] = {
     "backup": _backup, "restore": _restore, "invite": _invite, "account": _account, "token": _token, "tokens": _tokens,
     "revoke": _revoke, "person": _person, "audit": _audit,
 }  # fmt: skip
 """By the word after `python -m rapp_cloud`."""
+
+
+def administer(words: list[str], program: str, data: Path | None) -> int:
+    """Run the command that the first of the words names; return its exit status.
+
+    :param program: what stands before the words, where they are typed
+    :param data: the platform's folder, when the words do not say it
+    """
+    return COMMANDS[words[0]](partial(_parser, program, data), words[1:])

@@ -24,3 +24,13 @@ def test_help_about_what_is_no_command_names_those_there_are(capsys: pytest.Capt
         main(["help", "fly"])
     assert ended.value.code == 2
     assert "'up'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [("person",), ("person", "add"), ("tokens",)])
+def test_the_platform_s_commands_are_shown_as_they_are_typed(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["cloud", *words, "-h"])
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"usage: ./rapp cloud {' '.join(words)} [-h]")
+    assert "--data DIR" not in said.replace("[--data DIR]", "").partition("\n\n")[0]
