@@ -47,8 +47,12 @@ class Disk:
 def replace_whole(disk: Disk, path: Path, data: bytes) -> None:
     """Give a file new content, all or nothing."""
     aside = new_aside(path.parent)
-    disk.write(aside, data)
-    disk.rename(aside, path)
+    try:
+        disk.write(aside, data)
+        disk.rename(aside, path)
+    except OSError:
+        disk.remove(aside)
+        raise
 
 
 def new_aside(folder: Path) -> Path:

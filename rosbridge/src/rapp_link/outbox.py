@@ -125,7 +125,8 @@ class Outbox:
             self._disk.write(aside / "letter.json", to_json(letter))
             self._disk.rename(aside, self._place(letter))
         except OSError:
-            self._disk.remove(aside)
+            for path in (aside, self._place(letter)):  # in its place it is when only that could not be brought to the disk
+                self._disk.remove(path)
             raise
 
     def _reconcile(self) -> None:
