@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fakes.whole_robot import PATIENCE, Seen, WholeRobot, entered, listening_after, whole_robot
 
-Fault = tuple[str, str]  # name of a process, and what happens to it: "killed" or "frozen"
+Fault = tuple[str, str]  # name of a process, and what happens to it: "killed" or "frozen"; or of a line that is "cut"
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class FaultTable:
     suffer: Callable[[WholeRobot, str, str, str], Cell]
     patience: float = PATIENCE  # s for `serve`
     processes: tuple[str, ...] = ()  # of the robot; none: all
+    robot: Callable[[Fault], type[WholeRobot]] = lambda _: WholeRobot
 
     def fill(self, folder: Path, packages: list[Path], at_once: int) -> Cells:
         """All cases, `at_once` columns at a time."""
@@ -53,7 +54,7 @@ class FaultTable:
         cells: Cells = {}
         states = list(self.states)
         while states:
-            robot = WholeRobot(folder / f"robot-{len(states)}", packages)
+            robot = self.robot(fault)(folder / f"robot-{len(states)}", packages)
             try:
                 with whole_robot(robot, *self.processes):
                     serve(robot, self.patience)

@@ -1,5 +1,5 @@
-"""Each process of a four-agent RApp is killed or frozen in each of its states: the robot listens again, and nothing is left running
-anywhere, neither on the robot nor at the platform (deliverable section 3.2, DESIGN 3.1).
+"""Each process of a four-agent RApp is killed or frozen, or the line to the platform cut, in each of its states: the robot listens
+again, and nothing is left running anywhere, neither on the robot nor at the platform (deliverable section 3.2, DESIGN 3.1).
 
 One table, states x faults, printed at the end; as in `test_faults`, which has the states of three agents.
 """
@@ -13,16 +13,25 @@ import pytest
 
 from fakes.fault_table import Cell, Cells, FaultTable, listened_before, serve
 from fakes.rapps import write_four_agent_rapp, write_rapp
+from fakes.robot_behind_faults import RobotBehindFaults
 from fakes.whole_robot import PATIENCE, WholeRobot, inside
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(900)]
 
 AWAY = 1.5  # s a process is away
 SERVED = 2 * PATIENCE  # s to be served again
-BOUND = 25.0  # s to listen again: a silent cloud agent is given up after 5 s, a call of the cloud after its own time
+BOUNDS = {  # s to listen again; a RApp that misses nothing goes on for up to 3 s
+    ("a_dyn", "killed"): 5.0,  # DESIGN 3.1: 2 s, measured 1.1
+    ("a_dyn", "frozen"): 12.0,  # its silence counts after 5 s, and it is made to end
+    ("a_cloud", "killed"): 8.0,
+    ("a_cloud", "frozen"): 12.0,  # as a_dyn
+    ("line", "cut"): 8.0,
+}
+OTHERS = 12.0  # s, of a process that has come back; measured 7.4 on a busy machine
 PROCESSES = ("rosbridge", "link", "cloud", "core_agent")  # started again by the test, as their supervisor does
+ROBOTS = {"line": RobotBehindFaults}
 AGENTS = {"a_cloud": "rapp_hop.cloud_agent_runner", "a_dyn": "rapp_api.runner"}  # gone for good
-FAULTS = [(name, how) for name in (*AGENTS, *PROCESSES) for how in ("killed", "frozen")]
+FAULTS = [("line", "cut"), *((name, how) for name in (*AGENTS, *PROCESSES) for how in ("killed", "frozen"))]
 
 PROGRAM = """
 import asyncio
@@ -72,13 +81,17 @@ def suffer(robot: WholeRobot, state: str, name: str, how: str) -> Cell:
     robot.until(lambda seen: seen.detail == REACHED[state], since)
     if name in AGENTS:
         strike(robot, name, how)
+    elif isinstance(robot, RobotBehindFaults):
+        robot.cloud_line.cut()  # between link and platform
+        time.sleep(AWAY)
+        robot.cloud_line.back()
     else:
         robot.freeze(name) if how == "frozen" else robot.kill(name)
         time.sleep(AWAY)
         robot.thaw(name) if how == "frozen" else robot.start(name)
     back = time.monotonic()
     listened = listened_before(robot, serve(robot, SERVED))
-    assert listened.time - back < BOUND, f"it has listened again after {listened.time - back:.1f} s only"
+    assert listened.time - back < BOUNDS.get((name, how), OTHERS), f"it has listened again after {listened.time - back:.1f} s only"
     robot.until_only_the_spare_runs()
     robot.until_only_the_cloud_spare_runs()
     return Cell(max(0.0, listened.time - back), time.monotonic() - back)
@@ -97,9 +110,10 @@ def strike(robot: WholeRobot, name: str, how: str) -> None:
 def table(tmp_path_factory: pytest.TempPathFactory) -> Cells:
     """All cases; printed at the end."""
     folder = tmp_path_factory.mktemp("four")
-    cases = FaultTable(list(RAPPS), FAULTS, suffer, SERVED, ("roscore", "cloud", "nao_sim", "rosbridge", "link", "core_agent"))
+    processes = ("roscore", "cloud", "nao_sim", "rosbridge", "link", "core_agent")
+    cases = FaultTable(list(RAPPS), FAULTS, suffer, SERVED, processes, lambda fault: ROBOTS.get(fault[0], WholeRobot))
     cells = cases.fill(folder, rapps(folder / "rapps"), at_once=4)
-    cases.show(f"s until the robot listens again (bound {BOUND:g} s) / nothing is left (bound {PATIENCE:g} s)", cells)
+    cases.show(f"s until the robot listens again / nothing is left (bound {PATIENCE:g} s)", cells)
     return cells
 
 
