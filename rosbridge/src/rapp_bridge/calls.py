@@ -44,10 +44,11 @@ class _Call:
 class _Connection:
     """A persistent connection to a service; one call at a time."""
 
-    def __init__(self, name: str, line: "_Line", link: Outgoing, cls: Any) -> None:
+    def __init__(self, name: str, line: "_Line", link: Outgoing, address: tuple[str, int], cls: Any) -> None:
         self._name = name
         self._line = line
         self.link = link
+        self.address = address
         self.cls = cls
         self.born = asyncio.get_running_loop().time()
         self._call: _Call | None = None
@@ -64,6 +65,12 @@ class _Connection:
         self._call = call
         self.link.transport.write(len(request).to_bytes(4, "little") + request)
         return True
+
+    def retire(self) -> None:
+        """Take no further call: the service is no longer where this leads."""
+        self.born = float("-inf")
+        if self._call is None:
+            self.link.close()
 
     def has(self, call: _Call) -> bool:
         """Whether this call waits for its answer here."""
@@ -145,6 +152,7 @@ class Calls:
         self._blocking = blocking
         self._caller = caller
         self._lines: dict[str, _Line] = {}
+        self._looking: asyncio.Task[None] | None = None
 
     def call(self, name: str, args: list[Any] | dict[str, Any], seconds: float, done: Done) -> None:
         """Call the service of this global name; `done` gets the outcome, once, within `seconds`."""
@@ -162,7 +170,7 @@ class Calls:
             line.free(connection)
 
     def sweep(self) -> None:
-        """Close connections that are idle and old, so that a service that has moved is found; to be called now and then."""
+        """Close connections that are idle and old, or lead to where their service is no longer; to be called now and then."""
         old = asyncio.get_running_loop().time() - self._config.connection_age
         for name, line in list(self._lines.items()):
             for connection in [each for each in line.idle if each.born < old]:
@@ -170,9 +178,28 @@ class Calls:
                 line.lost(connection)
             if not line.opened and not line.waiting and line.opening is None:
                 del self._lines[name]
+        if self._looking is None or self._looking.done():
+            self._looking = asyncio.get_running_loop().create_task(self._look())
+
+    async def _look(self) -> None:
+        """Ask the master, one question after another, where the services are that connections are kept to."""
+        for name, line in list(self._lines.items()):
+            if not line.opened:
+                continue
+            address: tuple[str, int] | None = None
+            try:
+                address = await self._blocking.run(self._master.service_address, name)
+            except Unregistered:
+                pass
+            except Unreachable:
+                return  # the master is away, and the services may well be there
+            for connection in [each for each in line.opened if each.address != address]:
+                connection.retire()
 
     def close(self) -> None:
         """Close all connections."""
+        if self._looking is not None:
+            self._looking.cancel()
         for line in self._lines.values():
             line.waiting.clear()
             if line.opening is not None:
@@ -233,4 +260,4 @@ class Calls:
         except Invalid:
             link.close()
             raise
-        return _Connection(name, line, link, cls)
+        return _Connection(name, line, link, address, cls)

@@ -3,7 +3,7 @@
 import asyncio
 from typing import Any
 
-from fakes.bridge_neighbours import Clients, Socket, node
+from fakes.bridge_neighbours import PATIENCE, Clients, Socket, node
 from fakes.bridge_puppet import Puppet, puppet
 
 
@@ -169,6 +169,27 @@ def test_calls_that_wait_are_told_when_the_service_is_withdrawn(clients: Clients
     with puppet(ros_env, "stuck") as node:
         node.do(STUCK)
         asyncio.run(story(node))
+
+
+def test_a_service_that_is_withdrawn_is_called_no_longer_though_its_node_serves_the_connection_on(
+    start: Any, own_master: Any
+) -> None:
+    async def story(clients: Clients, node: Puppet) -> None:
+        async with clients:
+            socket = await clients.new()
+            assert (await socket.call("/withdrawn"))["values"]["message"] == "old"
+            node.do("service.shutdown()")
+            async with asyncio.timeout(PATIENCE):
+                while (answer := await socket.call("/withdrawn"))["result"]:
+                    await asyncio.sleep(0.05)
+            assert "no such service" in answer["values"]
+            node.do("service = rospy.Service('/withdrawn', Trigger, lambda _: TriggerResponse(True, 'new'))")
+            assert (await socket.call("/withdrawn"))["values"]["message"] == "new"
+
+    with puppet(own_master.env, "withdrawing") as withdrawing:
+        withdrawing.do("service = rospy.Service('/withdrawn', Trigger, lambda _: TriggerResponse(True, 'old'))")
+        bridge = start("rapp_bridge", "--port", "0", "--connection-age", "600", env=own_master.env)
+        asyncio.run(story(Clients(f"ws://127.0.0.1:{bridge.ready['port']}"), withdrawing))
 
 
 STUCK = """
