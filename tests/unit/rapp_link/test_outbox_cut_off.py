@@ -24,7 +24,7 @@ class PowerGoneError(BaseException):
 
 
 class CutDisk(Disk):
-    """Works for so many calls; then the power is gone, what was being written is torn, or every call that takes space is refused."""
+    """Works for so many calls; then the power is gone, what was being written is torn, or what takes space is refused."""
 
     def __init__(self, how: str, works: int) -> None:
         self.calls: list[str] = []
