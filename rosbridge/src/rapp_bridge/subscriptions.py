@@ -3,10 +3,8 @@
 import asyncio
 import logging
 import time
-from collections import deque
 from collections.abc import Awaitable, Coroutine
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any
 
 import rospy
@@ -16,117 +14,19 @@ from rapp_bridge.arrival import Arrival, Wire
 from rapp_bridge.blocking import Blocking
 from rapp_bridge.client import Client
 from rapp_bridge.config import Config
-from rapp_bridge.decoding import Raw
 from rapp_bridge.errors import Invalid, Unreachable
 from rapp_bridge.links import Outgoing
 from rapp_bridge.master import Master, publishes
 from rapp_bridge.node import Marker
-from rapp_bridge.pace import Pace
 from rapp_bridge.protocol import Subscribe, Unsubscribe
 from rapp_bridge.rostypes import message_class
+from rapp_bridge.subscribed import Source, Subscribed, Wish
 from rapp_bridge.topics import registered, topic_type
 
 CONNECT_TIMEOUT = 10.0  # s
 RETRY = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # s between attempts at a publisher that cannot be reached
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(eq=False)
-class _Wish:
-    """One client's subscription of one topic."""
-
-    client: Client
-    wire: Wire
-    throttle: float  # s between messages
-    queue_length: int
-    due: float = float("-inf")
-    held: deque[Arrival] = field(default_factory=deque)  # for when they are due
-    timer: asyncio.TimerHandle | None = None
-
-    def take(self, arrival: Arrival) -> None:
-        """Offer a message to the client, now, when it is due, or not at all."""
-        if self.throttle:
-            now = asyncio.get_running_loop().time()
-            if self.held or now < self.due:
-                self._hold(arrival)
-                return
-            self.due = now + self.throttle
-        self.client.offer(arrival, self.wire, self.queue_length)
-
-    def _hold(self, arrival: Arrival) -> None:
-        """Without a queue a message in the pause is dropped; with one the newest wait and come in their order."""
-        if not self.queue_length:
-            return
-        if not self.held:
-            self.timer = asyncio.get_running_loop().call_at(self.due, self._release)
-        self.held.append(arrival)
-        if len(self.held) > self.queue_length:
-            self.held.popleft()
-
-    def _release(self) -> None:
-        loop = asyncio.get_running_loop()
-        self.client.offer(self.held.popleft(), self.wire, self.queue_length)
-        self.due = loop.time() + self.throttle
-        if self.held:
-            self.timer = loop.call_at(self.due, self._release)
-
-    def end(self) -> None:
-        """It is over, or another takes its place: what is held comes no more."""
-        self.held.clear()
-        if self.timer is not None:
-            self.timer.cancel()
-
-
-@dataclass(eq=False)
-class _Source:
-    """A connection to one publisher; a latched topic's last message is kept for clients that come late."""
-
-    link: Outgoing
-    marker: Marker | None = None
-    latest: Arrival | None = None
-    cls: Any = None  # what its messages are; None: not known, or not the type that the clients want
-    latched: bool = False
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the link ends, or rospy has asked for its end."""
-        return not self.link.is_open or (self.marker is not None and self.marker.done)
-
-
-@dataclass(eq=False)
-class _Subscribed:
-    """A topic, who wants it, and who publishes it."""
-
-    name: str
-    cls: Any  # None: not known
-    subscriber: Any = None
-    wishes: dict[tuple[Client, str], _Wish] = field(default_factory=dict)  # by client and the topic as the client wrote it
-    sources: dict[str, _Source] = field(default_factory=dict)
-    unused_since: float = 0.0
-
-    def __post_init__(self) -> None:
-        self._pace = Pace(self._hold)
-
-    def _hold(self, on: bool) -> None:
-        for source in self.sources.values():
-            source.link.hold(on)
-
-    def deliver(self, source: _Source, raw: Raw) -> None:
-        if self.wishes or source.latched:
-            arrival = Arrival(raw, source.cls)
-            if source.latched:
-                source.latest = arrival
-            behind = False
-            for wish in self.wishes.values():
-                wish.take(arrival)
-                behind = wish.client.is_behind
-            if behind:
-                self._pace.check({wish.client for wish in self.wishes.values()})
-
-    def tell(self, text: str) -> None:
-        for client in {wish.client for wish in self.wishes.values()}:
-            client.tell("error", text)
 
 
 class Subscriptions:
@@ -138,7 +38,7 @@ class Subscriptions:
         self._blocking = blocking
         self._loop = asyncio.get_running_loop()
         self._change = asyncio.Lock()
-        self._subscribed: dict[str, _Subscribed] = {}
+        self._subscribed: dict[str, Subscribed] = {}
         self._connecting: set[asyncio.Task[None]] = set()
 
     def subscribe(self, client: Client, wish: Subscribe) -> Awaitable[None] | None:
@@ -148,7 +48,8 @@ class Subscriptions:
         """
         name = rospy.resolve_name(wish.topic)
         entry = self._subscribed.get(name)
-        if entry is None or entry.subscriber is None or (entry.cls is None and wish.compression != "cbor-raw"):
+        is_known = entry is not None and entry.subscriber is not None and (entry.cls is not None or wish.compression == "cbor-raw")
+        if entry is None or not is_known or not entry.suits(wish):
             return self._subscribe(client, name, wish)
         self._join(entry, client, wish)
         return None
@@ -166,8 +67,7 @@ class Subscriptions:
         async with self._change:
             for name, entry in list(self._subscribed.items()):
                 if not entry.wishes and entry.unused_since < old:
-                    del self._subscribed[name]
-                    await self._blocking.run(entry.subscriber.unregister)
+                    await self._close(name)
 
     def connect(self, name: str, publisher: str, address: tuple[str, int]) -> bool:
         """Connect to a publisher, soon; says whether the topic is ours. Called in rospy's threads."""
@@ -176,14 +76,16 @@ class Subscriptions:
         self._loop.call_soon_threadsafe(self._connect, name, publisher, address)
         return True
 
-    def _join(self, entry: _Subscribed, client: Client, wish: Subscribe) -> None:
+    def _join(self, entry: Subscribed, client: Client, wish: Subscribe) -> None:
         if entry.cls is not None and wish.type not in (None, entry.cls._type):
             raise Invalid(f"cannot subscribe to {wish.topic} as {wish.type}: it is {entry.cls._type}; use that type")
         wire = Wire(wish.topic, wish.compression, wish.fragment_size)
         if (changed := entry.wishes.get((client, wish.topic))) is not None:
             changed.end()
-        new = entry.wishes[client, wish.topic] = _Wish(client, wire, wish.throttle_rate / 1000, wish.queue_length)
+        new = entry.wishes[client, wish.topic] = Wish(client, wire, wish.throttle_rate / 1000, wish.queue_length)
         if not wish.again:
+            for text in entry.errors.values():
+                client.tell("error", text)
             for source in entry.sources.values():
                 if source.latest is not None:
                     new.take(source.latest)
@@ -191,15 +93,18 @@ class Subscriptions:
     async def _subscribe(self, client: Client, name: str, wish: Subscribe) -> None:
         async with self._change:
             entry = self._subscribed.get(name)
+            if entry is not None and not entry.suits(wish):
+                await self._close(name)
+                entry = None
             if entry is None:
                 entry = await self._open(name, wish)
             elif entry.cls is None:
                 await self._learn_type(entry, wish)
             self._join(entry, client, wish)
 
-    async def _open(self, name: str, wish: Subscribe) -> _Subscribed:
+    async def _open(self, name: str, wish: Subscribe) -> Subscribed:
         cls = await self._find_class(name, wish)
-        entry = self._subscribed[name] = _Subscribed(name, cls, unused_since=time.monotonic())
+        entry = self._subscribed[name] = Subscribed(name, cls, unused_since=time.monotonic())
         try:
             entry.subscriber = await self._blocking.run(registered, rospy.Subscriber, name, cls or rospy.AnyMsg)
         except Unreachable:
@@ -207,11 +112,15 @@ class Subscriptions:
             raise
         return entry
 
-    async def _learn_type(self, entry: _Subscribed, wish: Subscribe) -> None:
+    async def _close(self, name: str) -> None:
+        entry = self._subscribed.pop(name)
+        await self._blocking.run(entry.subscriber.unregister)
+
+    async def _learn_type(self, entry: Subscribed, wish: Subscribe) -> None:
         if wish.compression != "cbor-raw":
             entry.cls = await self._find_class(entry.name, wish)
-            for source in entry.sources.values():
-                self._check_type(entry, source)
+            for publisher, source in entry.sources.items():
+                self._check_type(entry, publisher, source)
                 if source.latest is not None:
                     source.latest = Arrival(source.latest.raw, source.cls)
 
@@ -238,29 +147,29 @@ class Subscriptions:
         self._connecting.add(task)
         task.add_done_callback(self._connecting.discard)
 
-    async def _connect_to(self, entry: _Subscribed, publisher: str, address: tuple[str, int]) -> None:
+    async def _connect_to(self, entry: Subscribed, publisher: str, address: tuple[str, int]) -> None:
         for pause in RETRY:
             if self._subscribed.get(entry.name) is not entry or publisher in entry.sources:
                 return
             link = Outgoing(self._header(entry), self._config.message_limit)
-            source = entry.sources[publisher] = _Source(link)
+            source = entry.sources[publisher] = Source(link)
             link.on_message = lambda raw, source=source: entry.deliver(source, raw)  # type: ignore[misc]
             link.on_lost = lambda source=source: self._lost(entry, publisher, source)  # type: ignore[misc]
-            link.on_opened = lambda source=source: self._check_type(entry, source)  # type: ignore[misc]
+            link.on_opened = lambda source=source: self._check_type(entry, publisher, source)  # type: ignore[misc]
             try:
                 await link.connect(address, CONNECT_TIMEOUT)
             except Unreachable as error:
                 entry.sources.pop(publisher, None)
                 _log.warning("topic %s of %s: %s", entry.name, publisher, error)
                 if link.fields:  # it has answered, so asking again helps nobody
-                    entry.tell(f"cannot get the messages of {entry.name} from {publisher}: {error}")
+                    entry.failed(publisher, f"cannot get the messages of {entry.name} from {publisher}: {error}")
                     return
                 await asyncio.sleep(pause)
                 continue
             self._mark(entry, publisher, source)
             return
 
-    def _header(self, entry: _Subscribed) -> dict[str, str]:
+    def _header(self, entry: Subscribed) -> dict[str, str]:
         cls = entry.cls or rospy.AnyMsg
         return {
             "topic": entry.name, "type": cls._type, "md5sum": cls._md5sum, "message_definition": cls._full_text,
@@ -268,32 +177,31 @@ class Subscriptions:
         }  # fmt: skip
 
     @staticmethod
-    def _mark(entry: _Subscribed, publisher: str, source: _Source) -> None:
+    def _mark(entry: Subscribed, publisher: str, source: Source) -> None:
         source.marker = Marker("i", entry.name, publisher, source.link.close)
         rospys = get_topic_manager().get_subscriber_impl(entry.name)
         if rospys is None or not rospys.add_connection(source.marker):
             source.link.close()
 
     @staticmethod
-    def _check_type(entry: _Subscribed, source: _Source) -> None:
+    def _check_type(entry: Subscribed, publisher: str, source: Source) -> None:
+        entry.errors.pop(publisher, None)
         fields = source.link.fields
         source.latched = fields.get("latching") == "1"
         if entry.cls is None or fields.get("md5sum") == entry.cls._md5sum:
             source.cls = entry.cls
         elif fields:
-            kind = entry.cls._type
-            entry.tell(
-                f"cannot read {entry.name} of {fields.get('callerid')}: it is {fields.get('type')}, not the {kind} known here"
-            )
+            node, kind, known = fields.get("callerid"), fields.get("type"), entry.cls._type
+            entry.failed(publisher, f"cannot read {entry.name} of {node}: it is {kind}, not the {known} known here")
 
-    def _lost(self, entry: _Subscribed, publisher: str, source: _Source) -> None:
+    def _lost(self, entry: Subscribed, publisher: str, source: Source) -> None:
         if entry.sources.get(publisher) is source:
             del entry.sources[publisher]
         if source.marker is not None and not source.marker.done:
             source.marker.close()
             self._work(self._ask_again(entry, publisher))
 
-    async def _ask_again(self, entry: _Subscribed, publisher: str) -> None:
+    async def _ask_again(self, entry: Subscribed, publisher: str) -> None:
         """The publisher has closed the link. It may publish on: rospy tells of it again only when it was gone from its lists."""
         await asyncio.sleep(RETRY[0])
         if self._subscribed.get(entry.name) is entry:

@@ -16,6 +16,7 @@ from sensor_msgs.msg import LaserScan
 from tornado.websocket import WebSocketClosedError
 
 from fakes.bridge_neighbours import PATIENCE, Clients, Peer, Socket
+from fakes.bridge_puppet import Puppet, puppet
 
 
 async def until(condition: Callable[[], bool]) -> None:
@@ -235,3 +236,30 @@ def test_what_a_throttled_subscription_holds_does_not_outlive_it(clients: Client
             assert json.loads(await listener.connection.read_message() or "")["op"] == "status"
 
     asyncio.run(story())
+
+
+def test_a_mistyped_subscription_is_told_to_all_and_gives_way_to_the_right_one(clients: Clients, ros_env: dict[str, str]) -> None:
+    wrong, right = {"type": "std_msgs/String"}, {"type": "std_msgs/Int32"}
+
+    async def story(node: Puppet) -> None:
+        async with clients:
+            mistaken = [await clients.new() for _ in range(3)]
+            await mistaken[0].send(op="subscribe", topic="/mistyped", **wrong)
+            await mistaken[0].settle()
+            node.do("publisher = rospy.Publisher('/mistyped', Int32, latch=True, queue_size=1)")
+            node.do("publisher.publish(7)")
+            for socket, wish in zip(mistaken, (None, wrong, {}), strict=True):
+                if wish is not None:
+                    await socket.send(op="subscribe", topic="/mistyped", **wish)
+                assert "cannot get the messages of /mistyped" in (await socket.receive("status"))["msg"]
+            other = await clients.new()
+            await other.send(op="subscribe", topic="/mistyped", **right)
+            assert "it is std_msgs/String" in (await other.receive("status"))["msg"]
+            for socket in mistaken:
+                await socket.send(op="unsubscribe", topic="/mistyped")
+                await socket.settle()
+            await other.send(op="subscribe", topic="/mistyped", **right)
+            assert (await other.receive("publish"))["msg"] == {"data": 7}
+
+    with puppet(ros_env, "typed") as typed:
+        asyncio.run(story(typed))

@@ -11,8 +11,9 @@ from std_msgs.msg import String
 from rapp_bridge import subscriptions
 from rapp_bridge.blocking import Blocking
 from rapp_bridge.config import Config
+from rapp_bridge.errors import Invalid
 from rapp_bridge.node import Marker
-from rapp_bridge.protocol import Subscribe
+from rapp_bridge.protocol import Subscribe, Unsubscribe
 from rapp_bridge.tcpros import encode_header
 
 PUBLISHER = "http://node:1"
@@ -58,5 +59,22 @@ def test_a_publisher_that_registers_again_is_connected_to_though_the_old_link_s_
         held.connect("/topic", PUBLISHER, address)
         await until(lambda: len(links) == 2 and len(markers) == 2)
         server.close()
+
+    asyncio.run(story())
+
+
+@pytest.mark.usefixtures("markers")
+def test_a_topic_that_nobody_wants_any_more_is_opened_anew_for_another_type() -> None:
+    async def story() -> None:
+        master: Any = None
+        client: Any = object()
+        held = subscriptions.Subscriptions(Config(), master, Blocking(1))
+        for kind in ("std_msgs/String", "std_msgs/Int32"):
+            waiting = held.subscribe(client, Subscribe("/topic", kind))
+            assert waiting is not None
+            await waiting
+            with pytest.raises(Invalid, match=f"it is {kind}"):
+                held.subscribe(client, Subscribe("/topic", "std_msgs/Float32"))
+            held.unsubscribe(client, Unsubscribe("/topic"))
 
     asyncio.run(story())
