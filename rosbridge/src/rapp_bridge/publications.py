@@ -26,7 +26,6 @@ from rapp_bridge.topics import registered, topic_type
 
 OPENING = 1.0  # s after the first advertisement in which messages are kept for subscribers that are still to connect
 AWAITED = 10.0  # s in which they are kept for subscribers that were there before
-OPENING_KEPT = 32  # messages, at most, that are kept meanwhile
 WARNED_AGAIN = 1.0  # s between warnings about messages that are lost
 
 
@@ -40,6 +39,7 @@ class _Published:
     cls: Any
     latch: bool
     queue_size: int
+    queue_limit: int  # bytes that wait for a subscriber, at most
     awaited: set[str]  # nodes that subscribe the topic, and have not connected yet
     publisher: Any = None
     clients: set[tuple[Client, str]] = field(default_factory=set)  # and the topic as they wrote it
@@ -50,7 +50,8 @@ class _Published:
     warned: float = float("-inf")
 
     def __post_init__(self) -> None:
-        self.kept: deque[bytes] = deque(maxlen=1 if self.latch else min(self.queue_size, OPENING_KEPT))
+        self.kept: deque[bytes] = deque()
+        self.kept_size = 0  # bytes
         self.has_header = has_header(self.cls)
         self.keeps = True
 
@@ -68,11 +69,17 @@ class _Published:
             link.send(framed)
 
     def keep(self, framed: bytes) -> None:
-        if self.latch or self.is_opening:
-            self.kept.append(framed)
-        else:
+        if not self.latch and not self.is_opening:
             self.keeps = False
             self.kept.clear()
+            return
+        self.kept.append(framed)
+        self.kept_size += len(framed)
+        most = 1 if self.latch else self.queue_size
+        while len(self.kept) > most or (self.kept_size > self.queue_limit and len(self.kept) > 1):
+            self.kept_size -= len(self.kept.popleft())
+            if self.awaited and not self.latch:
+                self.warn(f"until {', '.join(sorted(self.awaited))} has connected; the oldest are dropped")
 
     @property
     def is_opening(self) -> bool:
@@ -132,7 +139,7 @@ class Publications:
             raise Invalid(f"cannot use topic {wish.topic} without a type: nobody publishes or subscribes it; give its type")
         cls, size = message_class(kind), max(1, wish.queue_size)
         awaited = await self._blocking.run(self._master.subscribers, name)
-        entry = self._published[name] = _Published(name, cls, wish.latch, size, awaited)
+        entry = self._published[name] = _Published(name, cls, wish.latch, size, self._queue_limit, awaited)
         try:
             entry.publisher = await self._blocking.run(_publisher, name, cls, wish.latch)
         except Unreachable:
@@ -192,7 +199,7 @@ class Publications:
         link = SubscriberLink(
             transport,
             entry.queue_size,
-            self._queue_limit,
+            entry.queue_limit,
             lambda gone: self._lost(entry, gone),
             lambda: entry.warn(f"for {caller}: it reads too slowly; the oldest are dropped"),
         )

@@ -55,6 +55,45 @@ def test_a_page_that_is_reloaded_loses_no_message(clients: Clients, peer: Peer, 
     asyncio.run(story())
 
 
+BURST = 300
+
+
+def test_all_that_is_published_at_once_reaches_a_node_that_has_listened_before(clients: Clients, ros_env: dict[str, str]) -> None:
+    async def story(node: Puppet) -> None:
+        async with clients:
+            page = await clients.new()
+            await page.send(op="advertise", topic="/burst", type="std_msgs/String", queue_size=BURST)
+            for number in range(BURST):
+                await page.send(op="publish", topic="/burst", msg={"data": str(number)})
+
+            async def is_heard() -> bool:
+                return len(node.do("heard")) >= BURST
+
+            await until(is_heard)
+            assert node.do("heard") == [str(number) for number in range(BURST)]
+
+    with puppet(ros_env, "early") as early:
+        early.do("heard = []")
+        early.do("rospy.Subscriber('/burst', String, lambda message: heard.append(message.data))")
+        asyncio.run(story(early))
+
+
+def test_a_page_may_know_that_not_all_it_publishes_at_once_is_kept(clients: Clients, ros_env: dict[str, str]) -> None:
+    async def story() -> None:
+        async with clients:
+            page = await clients.new()
+            await page.send(op="set_level", level="warning")
+            await page.send(op="advertise", topic="/too_much", type="std_msgs/String", queue_size=10)
+            for number in range(BURST):
+                await page.send(op="publish", topic="/too_much", msg={"data": str(number)})
+            assert "messages of /too_much until /frozen has connected" in (await page.receive("status"))["msg"]
+
+    with puppet(ros_env, "frozen") as frozen:
+        frozen.do("rospy.Subscriber('/too_much', String)")
+        frozen.process.send_signal(signal.SIGSTOP)
+        asyncio.run(story())
+
+
 async def echoes(clients: Clients, listener: Socket) -> None:
     """Wait until the node's echo reaches the listener, by a publisher of its own."""
     speaker = await clients.new()
