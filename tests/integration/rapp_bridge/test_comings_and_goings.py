@@ -62,9 +62,12 @@ def test_all_that_is_published_at_once_reaches_a_node_that_has_listened_before(c
     async def story(node: Puppet) -> None:
         async with clients:
             page = await clients.new()
+            node.process.send_signal(signal.SIGSTOP)  # so that it connects after all has been published
             await page.send(op="advertise", topic="/burst", type="std_msgs/String", queue_size=BURST)
             for number in range(BURST):
                 await page.send(op="publish", topic="/burst", msg={"data": str(number)})
+            await page.settle()
+            node.process.send_signal(signal.SIGCONT)
 
             async def is_heard() -> bool:
                 return len(node.do("heard")) >= BURST
