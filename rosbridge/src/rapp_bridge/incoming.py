@@ -1,5 +1,6 @@
 """Frames from clients to messages, with all their fields checked. No I/O."""
 
+import json
 import re
 from collections.abc import Callable
 from functools import lru_cache
@@ -41,9 +42,26 @@ def parse(frame: str | bytes) -> dict[str, Any]:
         try:
             fields = orjson.loads(frame)
         except orjson.JSONDecodeError as error:
-            raise Invalid(f"cannot read the message: {error}; send one JSON object per frame") from error
+            fields = _with_constants(frame)
+            if fields is None:
+                raise Invalid(f"cannot read the message: {error}; send one JSON object per frame") from error
     if type(fields) is not dict:
         raise Invalid("cannot read the message: it is no object with an op")
+    return fields
+
+
+def _with_constants(frame: str | bytes) -> Any:
+    """The value of a frame with NaN or Infinity, which Python's clients write and JSON does not know; None when that is not all
+    that is wrong with it.
+    """
+    text = frame if isinstance(frame, str) else frame.decode(errors="surrogateescape")
+    if "NaN" not in text and "Infinity" not in text:
+        return None
+    try:
+        fields = json.loads(text)
+        orjson.dumps(fields)  # refuses what it would not have read: text that is no Unicode, huge integers, deep nesting
+    except (ValueError, TypeError, RecursionError):
+        return None
     return fields
 
 

@@ -1,6 +1,11 @@
+import math
+import struct
+
 import cbor2
 import pytest
+from std_msgs.msg import Float32MultiArray
 
+from rapp_bridge.encoding import encode
 from rapp_bridge.errors import Invalid
 from rapp_bridge.incoming import decode, parse
 from rapp_bridge.protocol import Advertise, Auth, CallService, Fragment, Publish, ServiceResponse, SetLevel, Subscribe
@@ -46,6 +51,33 @@ def test_a_frame_is_one_json_object(frame: str | bytes) -> None:
 
 def test_a_binary_frame_with_json_is_read() -> None:
     assert parse(b'{"op": "x"}') == {"op": "x"}
+
+
+CONSTANTS = '{"op":"publish","topic":"/x","msg":{"data":[NaN,Infinity,-Infinity,1.5]}%s}'
+
+
+@pytest.mark.parametrize("as_bytes", [True, False])
+def test_what_python_s_json_writes_for_nan_and_infinity_is_read(as_bytes: bool) -> None:
+    text = CONSTANTS % ',"id":"ä\\ud83d\\ude00"'
+    fields = parse(text.encode() if as_bytes else text)
+    assert fields["id"] == "ä😀"
+    assert encode(fields["msg"], Float32MultiArray)[-16:] == struct.pack("<4f", math.nan, math.inf, -math.inf, 1.5)
+
+
+@pytest.mark.parametrize(
+    "more",
+    ["}", ',"id":"\\ud800"', f',"id":{1 << 70}', f',"id":{"9" * 5000}', ',"id":' + "[" * 900 + "]" * 900, ',"id":' + "[" * 90_000,
+     ',"id":"\n"'],
+    ids=["brace", "surrogate", "big-integer", "huge-integer", "deep", "deeper", "control"],
+)  # fmt: skip
+def test_beside_nan_all_is_refused_that_is_refused_without(more: str) -> None:
+    with pytest.raises(Invalid, match=r"^cannot read the message"):
+        parse(CONSTANTS % more)
+
+
+def test_beside_nan_bytes_that_are_no_text_are_refused() -> None:
+    with pytest.raises(Invalid, match=r"^cannot read the message"):
+        parse((CONSTANTS % ',"id":"?"').encode().replace(b"?", b"\xff"))
 
 
 @pytest.mark.parametrize("name", ["/", "~", "~/", "//", "*", "/a b", "/a-b", "1a", "/" + "a" * 1000])
