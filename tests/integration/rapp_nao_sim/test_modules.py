@@ -1,5 +1,7 @@
 """Modules, their memory and the room, as a client written for a real NAO calls them."""
 
+import time
+
 import pytest
 
 
@@ -15,6 +17,24 @@ def test_every_module_answers(texted, name):
     assert module.ping() is True
     assert module.version().startswith("2.1")
     assert module.getBrokerName() == "nao_sim"
+
+
+def test_every_module_tells_its_methods(texted, failing):
+    for name in ("ALMemory", "ALSpeechRecognition", "SimWorld"):
+        module = texted.service(name)
+        methods = module.getMethodList()
+        assert {"ping", "getMethodHelp"} <= set(methods)
+        assert not [method for method in methods if method.startswith("_")]
+        assert [module.getMethodHelp(method)[0] for method in methods] == methods
+        assert module.getModuleHelp()[0]
+    memory = texted.service("ALMemory")
+    name, does, parameters, _, gives = memory.getMethodHelp("getData")
+    assert (name, parameters, gives) == ("getData", [["key", "str"]], "Any")
+    assert does.startswith("The value of a key")
+    assert memory.getUsage("insertData").startswith("insertData(key: str, value: Any) -> None\nSet a key")
+    for question in ("getMethodHelp", "getUsage"):
+        with failing(f"ALMemory::{question}", "cannot find method 'fly'"):
+            getattr(memory, question)("fly")
 
 
 def test_what_is_not_there_is_said(texted):
@@ -40,6 +60,22 @@ def test_memory_does_not_invent_data(memory, failing):
         memory.getData()
 
 
+def test_memory_knows_when_a_key_was_set_and_what_it_is(memory, failing):
+    before = time.time()
+    memory.insertData("dated", 5)
+    value, seconds, micros = memory.getTimestamp("dated")
+    assert value == 5
+    assert before - 1e-5 <= seconds + micros / 1e6 <= time.time()
+    assert memory.getType("dated") == "Data"
+    memory.raiseEvent("dated", 6)
+    assert memory.getTimestamp("dated")[0] == 6
+    assert memory.getTimestamp("dated")[1:] > [seconds, micros]
+    assert memory.getType("dated") == "Event"
+    for question in ("getTimestamp", "getType"):
+        with failing(f"ALMemory::{question}", "data not found: none"):
+            getattr(memory, question)("none")
+
+
 def test_events_reach_subscribers_in_order_and_insertions_do_not(memory, events, wait_for):
     raised = events("count")
     memory.insertData("count", -1)
@@ -62,9 +98,11 @@ def test_events_call_a_clients_module_as_naoqi_did(texted, memory, failing, wait
     number = texted.session.registerService("Listener", listener)
     try:
         memory.subscribeToEvent("bell", "Listener", "onEvent")
+        assert memory.getSubscribers("bell") == ["Listener"]
         memory.raiseEvent("bell", "rings")
         wait_for(lambda: listener.heard == [("bell", "rings", "")])
         memory.unsubscribeToEvent("bell", "Listener")
+        assert memory.getSubscribers("bell") == []
         with failing("ALMemory::unsubscribeToEvent", "Listener is not subscribed to bell"):
             memory.unsubscribeToEvent("bell", "Listener")
     finally:

@@ -1,5 +1,6 @@
 """How NAOqi behaves seen from outside: work off the event loop, errors as "Module::method" texts, what every module has."""
 
+import inspect
 import logging
 import threading
 from collections.abc import Callable
@@ -41,7 +42,7 @@ def working(method: Callable[..., Any]) -> Callable[..., Any]:
         threading.Thread(target=_work, args=(promise, name, method, self, args), daemon=True, name=name).start()
         return promise.future()
 
-    return _named(call, method)
+    return named(call, method)
 
 
 def quick(method: Callable[..., Any]) -> Callable[..., Any]:
@@ -55,7 +56,7 @@ def quick(method: Callable[..., Any]) -> Callable[..., Any]:
             promise.setError(_text(_name(self, method), error))
             return promise.future()
 
-    return _named(call, method)
+    return named(call, method)
 
 
 def promised(name: str, future: "Future[Any]") -> Any:
@@ -99,15 +100,27 @@ def _name(module: Any, method: Callable[..., Any]) -> str:
     return f"{type(module).__name__}::{method.__name__}"
 
 
-def _named(call: Callable[..., Any], method: Callable[..., Any]) -> Callable[..., Any]:
+def named(call: Callable[..., Any], method: Callable[..., Any]) -> Callable[..., Any]:
+    """Make what stands for a module's method known as it: by its name, and to the help that a module gives of itself."""
     # Not functools.wraps: libqi would read the wrapped signature and refuse calls that leave out arguments with defaults.
     call.__name__ = method.__name__
     call.__doc__ = method.__doc__
+    call.method = method  # type: ignore[attr-defined]
+    return call
+
+
+def _original(call: Callable[..., Any]) -> Callable[..., Any]:
+    """The method as it was written, below what stands for it."""
+    while hasattr(call, "method"):
+        call = call.method
     return call
 
 
 class Module:
-    """What every NAOqi module answers (ALModule)."""
+    """What every NAOqi module answers (ALModule).
+
+    There is no wait, isRunning or stop: they take the number that `post` gives for a call, which the client's proxy keeps.
+    """
 
     def ping(self) -> bool:
         """True."""
@@ -120,3 +133,31 @@ class Module:
     def getBrokerName(self) -> str:  # noqa: N802 - NAOqi's spelling
         """Name of the broker."""
         return "nao_sim"
+
+    def getMethodList(self) -> list[str]:  # noqa: N802
+        """Names of the methods."""
+        return [name for name in dir(type(self)) if not name.startswith("_") and callable(getattr(type(self), name))]
+
+    def getModuleHelp(self) -> list[Any]:  # noqa: N802
+        """What the module is for, and a list of examples, which is empty."""
+        return [inspect.getdoc(type(self)), []]
+
+    @quick
+    def getMethodHelp(self, name: str) -> list[Any]:  # noqa: N802
+        """A method's name, what it does, [name, type] of each parameter, an empty name and the type of what it returns."""
+        return self.__help(name)
+
+    @quick
+    def getUsage(self, name: str) -> str:  # noqa: N802
+        """How a method is called, and what it does, as one text."""
+        _, does, parameters, _, gives = self.__help(name)
+        return f"{name}({', '.join(f'{part}: {kind}' for part, kind in parameters)}) -> {gives}\n{does}"
+
+    def __help(self, name: str) -> list[Any]:
+        if name not in self.getMethodList():
+            raise NaoqiError(f"cannot find method {name!r}; getMethodList tells all")
+        method = _original(getattr(type(self), name))
+        signature = inspect.signature(method)
+        parts = list(signature.parameters.values())[1:]  # without self
+        parameters = [[str(part).partition(":")[0].lstrip("_"), inspect.formatannotation(part.annotation)] for part in parts]
+        return [name, inspect.getdoc(method) or "", parameters, "", inspect.formatannotation(signature.return_annotation)]

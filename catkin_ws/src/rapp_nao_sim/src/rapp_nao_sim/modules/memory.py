@@ -2,6 +2,7 @@
 
 import logging
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, Protocol
@@ -50,6 +51,7 @@ class ALMemory(Module):
         self.__source: list[Source] = [source or _Nothing()]
         self.__lock = threading.RLock()
         self.__values: dict[str, Any] = {}
+        self.__set_at: dict[str, float] = {}  # when each key of `values` was set
         self.__subscribers: dict[str, Subscriber] = {}
         self.__modules: dict[str, dict[str, str]] = {}
         self.__news: dict[str, deque[tuple[str, str, Any]]] = {}  # what is to be told to modules, while a thread tells it
@@ -57,13 +59,32 @@ class ALMemory(Module):
     @working
     def getData(self, key: str) -> Any:  # noqa: N802
         """The value of a key; an error when nobody has set it."""
+        return self.__look(key)[0]
+
+    @working
+    def getTimestamp(self, key: str) -> list[Any]:  # noqa: N802
+        """[value, s, us]: a key with the time when it was set; a key of the body is read now. An error when nobody has set it."""
+        value, when = self.__look(key)
+        return [value, int(when), int(when % 1 * 1e6)]
+
+    @quick
+    def getType(self, key: str) -> str:  # noqa: N802
+        """What a key is: "Event", as getEventList has it, or "Data"; an error when nobody has set it."""
+        with self.__lock:
+            if key in self.__subscribers:
+                return "Event"
+            if key in self.__values or key in self.__source[0].names():
+                return "Data"
+        raise NaoqiError(f"data not found: {key}")
+
+    def __look(self, key: str) -> tuple[Any, float]:
         source = self.__source[0]
         if key in source.names():
-            return source.read()[key]
+            return source.read()[key], time.time()
         with self.__lock:
             if key not in self.__values:
                 raise NaoqiError(f"data not found: {key}")
-            return self.__values[key]
+            return self.__values[key], self.__set_at[key]
 
     @working
     def getListData(self, keys: list[str]) -> list[Any]:  # noqa: N802
@@ -81,12 +102,13 @@ class ALMemory(Module):
     def insertData(self, key: str, value: Any) -> None:  # noqa: N802
         """Set a key without telling its subscribers."""
         with self.__lock:
-            self.__values[key] = value
+            self.__values[key], self.__set_at[key] = value, time.time()
 
     def removeData(self, key: str) -> None:  # noqa: N802
         """Forget a key."""
         with self.__lock:
             self.__values.pop(key, None)
+            self.__set_at.pop(key, None)
 
     def getDataListName(self) -> list[str]:  # noqa: N802
         """All keys."""
@@ -109,7 +131,7 @@ class ALMemory(Module):
     def raiseEvent(self, key: str, value: Any) -> None:  # noqa: N802
         """Set a key and tell its subscribers."""
         with self.__lock:
-            self.__values[key] = value
+            self.__values[key], self.__set_at[key] = value, time.time()
             modules = dict(self.__modules.get(key, {}))
         self.subscriber(key).signal(value)
         for module, method in modules.items():
@@ -135,6 +157,11 @@ class ALMemory(Module):
         with self.__lock:
             if self.__modules.get(key, {}).pop(module, None) is None:
                 raise NaoqiError(f"{module} is not subscribed to {key}")
+
+    def getSubscribers(self, key: str) -> list[str]:  # noqa: N802
+        """The modules that subscribeToEvent was called for; who listens to a `subscriber` is not known by name."""
+        with self.__lock:
+            return sorted(self.__modules.get(key, {}))
 
     def __queue(self, module: str, news: tuple[str, str, Any]) -> None:
         """Have a module told, after all that it is still to be told."""

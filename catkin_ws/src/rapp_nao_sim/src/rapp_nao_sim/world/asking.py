@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from rapp_nao_sim.naoqi import NaoqiError, working
+from rapp_nao_sim.naoqi import NaoqiError, named, working
 from rapp_nao_sim.world.errors import WorldError
 from rapp_nao_sim.world.frames import Stance
 
@@ -54,6 +54,4 @@ def asking(method: Callable[..., Any]) -> Callable[..., Any]:
         except (WorldError, ValueError) as error:
             raise NaoqiError(str(error)) from error
 
-    call.__name__ = method.__name__
-    call.__doc__ = method.__doc__
-    return working(call)
+    return working(named(call, method))
