@@ -104,6 +104,7 @@ class RosSide:
             self._publish("alive", {"data": json.dumps(sign)})
 
     def _announce(self, protocol: Any) -> None:
+        protocol.transport.setTcpNoDelay(True)  # what follows an answer would wait 40 ms for the bridge's acknowledgement
         # roslibpy has no handler for `status` and logs a stack trace without the text of the error instead.
         protocol._message_handlers["status"] = lambda message: _log.error("rosbridge says: %s", message.get("msg"))
         for topic, kind in (("events", "rapp_msgs/HopEvent"), ("alive", "std_msgs/String")):
