@@ -5,7 +5,8 @@
 Starts a whole robot and a platform as `./rapp demo` does, and asks for a RApp by an isolated keyword and by a whole sentence,
 installed and fresh (never seen: neither the package nor the store's metadata). Medians; the phases are those of `phases.py`.
 In the same run: a plain start of the same agent without sandbox and launcher (python, import rospy, init_node, first service
-call), and bare bubblewrap. Exit status 1 when a budget is missed.
+call), bare bubblewrap; a cloud agent from order to serving, and a call through the link beside its HTTP call. Exit status 1
+when a budget is missed.
 """
 
 import argparse
@@ -30,6 +31,7 @@ os.environ.setdefault("QI_LOG_LEVEL", "1")  # libqi reads it when loaded, and lo
 import numpy as np
 import qi
 import soundfile
+from cloud_ways import measure_cloud
 from phases import FIRST_CALL, ORDER, SPEECH_ENDED, UNDERSTOOD, Marks, Stamp, between, marks, timeline
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
@@ -245,12 +247,13 @@ async def measure(folder: Path, rounds: int) -> int:
     async with stage(folder) as at:
         found = await activations(at, rounds)
         bare = await bare_starts(at, folder, max(3, rounds))
+        cloud = await measure_cloud(at.system.bridge, at.system.cloud, rounds)
     print(f"\nRApp {RAPP}, voice {VOICE}, {rounds} rounds; keyword “{SAID['keyword']}”, command “{SAID['command']}”\n")
     print(table(found) + "\n")
     for name, seconds in bare.items():
         print(f"{name:<58}{seconds * 1000:8.0f} ms")
     print()
-    return 0 if verdict(found, bare) else 1
+    return 0 if all([verdict(found, bare), cloud.verdict()]) else 1
 
 
 def main() -> int:

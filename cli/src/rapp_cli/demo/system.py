@@ -36,6 +36,7 @@ class System:
     master: str  # URI of the ROS master
     maildir: Path
     logs: Path
+    cloud: Cloud
 
 
 @asynccontextmanager
@@ -60,7 +61,7 @@ async def running_system(config: DemoConfig, rapps: Sequence[Path] | None = None
             words += ["--microphone", "text", "--voice", "silent"]
         env = {**confided(os.environ, LINK), **link_environment(cloud, account)}
         ready = await children.start(Child("robot", words, env, logs / "robot.log"))
-        yield System(children, ready["bridge"], ready["robot"], ready["master"], maildir, logs)
+        yield System(children, ready["bridge"], ready["robot"], ready["master"], maildir, logs, cloud)
 
 
 async def _mail_server(children: Children, maildir: Path, logs: Path) -> MailAccount:
