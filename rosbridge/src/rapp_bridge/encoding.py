@@ -4,8 +4,8 @@ Value rules of rosbridge v2 on ROS 1: a time is {secs, nsecs} or "now", uint8[] 
 null is NaN, missing fields are defaults, a Header without a stamp is stamped now.
 """
 
-import binascii
 import math
+import string
 import struct
 from collections.abc import Callable, Hashable
 from functools import cache
@@ -22,6 +22,7 @@ Write = Callable[[Any, bytearray], None]
 """Appends a value's bytes; raises `_Off`."""
 
 _LENGTH = struct.Struct("<I")
+_BLANKS = dict.fromkeys(map(ord, string.whitespace))
 _FLOATS = ("float32", "float64")
 
 
@@ -266,13 +267,21 @@ def _octets_writer() -> Callable[[Any, bytearray], int]:
 
     def write(value: Any, out: bytearray) -> int:
         if type(value) is str:
-            try:
-                value = pybase64.b64decode(value, validate=True)
-            except (binascii.Error, ValueError) as error:
-                raise _Off(f"{error} in its base64 text") from error
+            value = _octets(value)
         if type(value) is bytes:
             out += value
             return len(value)
         return write_list(value, out)
 
     return write
+
+
+def _octets(text: str) -> bytes:
+    """The bytes of a base64 text, which may be broken into lines (RFC 2045) as Python's encodebytes does."""
+    try:
+        try:
+            return pybase64.b64decode(text, validate=True)
+        except ValueError:
+            return pybase64.b64decode(text.translate(_BLANKS), validate=True)
+    except ValueError as error:
+        raise _Off(f"{error} in its base64 text") from error

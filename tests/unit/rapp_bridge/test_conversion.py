@@ -114,6 +114,11 @@ def test_a_picture_is_base64_text() -> None:
     assert from_json({"data": [1, 2, 3]}, Image).data == from_json({"data": "AQID"}, Image).data == b"\x01\x02\x03"
 
 
+@pytest.mark.parametrize("text", [base64.encodebytes(bytes(200)).decode(), " A A==\t", "AA==\r\n\v\f"])
+def test_base64_text_may_be_broken_into_lines(text: str) -> None:
+    assert not any(from_json({"data": text}, UInt8MultiArray).data)
+
+
 def test_missing_fields_keep_their_defaults_and_a_header_given_without_stamp_is_stamped_now() -> None:
     assert from_json({}, PoseStamped).header.stamp > genpy.Time(1_500_000_000, 0), "as the protocol's document promises"
     assert from_json({}, Path).header.stamp > genpy.Time(1_500_000_000, 0)
