@@ -85,15 +85,23 @@ class Session:
             return []
         self._undo = _nothing
         fields: dict[str, Any] = {}
+        fragment_id: Id = None
         try:
             fields = parse(frame)
             message = decode(fields)
             if self._access is None:
                 return self._enter(message)
             if type(message) is Fragment:
-                return self._take_fragment(message, now)
+                text = self._fragments.take(message, now)
+                if text is None:
+                    return []
+                fragment_id, whole = message.id, parse(text)
+                if whole.get("op") == "fragment":
+                    raise Invalid("cannot use a fragment made of fragments")
+                fields = whole
+                message = decode(fields)
         except BridgeError as error:
-            return self._bad_frame(error, fields)
+            return self._bad_frame(error, fields, fragment_id)
         return self._serve(message)
 
     def answered(self, call: CallService, values: list[Piece]) -> list[Effect]:
@@ -135,13 +143,13 @@ class Session:
         except BridgeError as error:
             return self._error(message, error)
 
-    def _bad_frame(self, error: BridgeError, fields: dict[str, Any]) -> list[Effect]:
+    def _bad_frame(self, error: BridgeError, fields: dict[str, Any], fragment_id: Id) -> list[Effect]:
         if self._access is None:
             return self._turn_away(error)
         message_id, service = id_of(fields), fields.get("service")
         if fields.get("op") == "call_service" and type(service) is str:  # its caller waits
             return [Send(service_failure(CallService(cut(service), {}, message_id), str(error)))]
-        return self.tell("error", str(error), message_id)
+        return self.tell("error", str(error), fragment_id if message_id is None else message_id)
 
     def _enter(self, message: Message) -> list[Effect]:
         if type(message) is not Auth:
@@ -152,15 +160,6 @@ class Session:
     def _turn_away(self, error: BridgeError) -> list[Effect]:
         self._over = True
         return [Send(status("error", str(error))), Close(POLICY, "not authenticated")]
-
-    def _take_fragment(self, part: Fragment, now: float) -> list[Effect]:
-        text = self._fragments.take(part, now)
-        if text is None:
-            return []
-        message = decode(parse(text))
-        if type(message) is Fragment:
-            raise Invalid("cannot use a fragment made of fragments")
-        return self._serve(message)
 
     def _error(self, message: Message, error: BridgeError) -> list[Effect]:
         if type(message) is CallService:

@@ -273,3 +273,12 @@ def test_a_client_that_has_shown_its_token_before_need_not_again() -> None:
     session = Session(LIMITS, Gate({TOKEN: Access("it")}, lambda: 0.0), resolve, Access("it", ("/mine",), (), ()))
     assert receive(session, op="subscribe", topic="/mine") == [Subscribe("/mine")]
     assert "it may not" in sent(receive(session, op="subscribe", topic="/other"))["msg"]
+
+
+def test_what_is_off_in_a_message_of_fragments_is_told_as_if_it_had_come_whole(session: Session) -> None:
+    inner = json.dumps({"op": "call_service", "service": "/s", "id": "call", "args": "x"})
+    assert receive(session, op="fragment", id="f", num=0, total=2, data=inner[:9]) == []
+    answer = sent(receive(session, op="fragment", id="f", num=1, total=2, data=inner[9:]))
+    assert (answer["op"], answer["id"], answer["result"]) == ("service_response", "call", False)
+    assert "field args is str" in answer["values"]
+    assert sent(receive(session, op="fragment", id="f", num=0, total=1, data="{"))["id"] == "f"
