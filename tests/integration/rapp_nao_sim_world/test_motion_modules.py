@@ -5,13 +5,14 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 os.environ.setdefault("QI_LOG_LEVEL", "1")  # libqi logs on standard output otherwise
 
 import qi
 
-from rapp_nao_sim.world.model import BODY
+from rapp_nao_sim.world.model import BODY, LINKS
 from rapp_nao_sim.world.motion_modules import modules
 from rapp_nao_sim.world.process import WorldClient
 
@@ -45,6 +46,44 @@ def test_the_body_is_described(motion: Any) -> None:
     assert motion.getBodyNames("Head") == ["HeadYaw", "HeadPitch"]
     assert motion.getLimits("HeadYaw")[0][:2] == pytest.approx([-2.0857, 2.0857], abs=1e-3)
     assert len(motion.getLimits("Body")) == 26
+
+
+def test_the_mass_of_the_body_and_its_parts(motion: Any) -> None:
+    assert motion.getMass("Body") == pytest.approx(5.305, abs=0.01)
+    assert motion.getMass("Com") == motion.getMass("Joints") == motion.getMass("Body")
+    parts = [motion.getMass(name) for name in ("Torso", "Head", "LArm", "RArm", "LLeg", "RLeg")]
+    assert sum(parts) == pytest.approx(motion.getMass("Body"))
+    assert motion.getMass("HeadPitch") == pytest.approx(0.60533)
+    with pytest.raises(RuntimeError, match=r"ALMotion::getMass\n\tcannot find joint 'Tail'"):
+        motion.getMass("Tail")
+
+
+def test_the_centre_of_mass_is_where_the_links_truly_are(motion: Any, posture: Any, world: WorldClient) -> None:
+    assert posture.goToPosture("Sit", 1.0)
+    motion.angleInterpolation(["LShoulderPitch", "HeadYaw"], [0.0, 0.5], 0.5, True)
+    time.sleep(0.5)  # what moved comes to rest, between the two answers too
+    told = motion.getCOM("Body", 0, True)
+    moment, mass = np.zeros(4), 0.0
+    for name, link in LINKS.items():
+        moment += link.mass * np.array(world.link(name)).reshape(4, 4) @ [*link.centre, 1.0]
+        mass += link.mass
+    true = np.linalg.inv(np.array(world.link("torso")).reshape(4, 4)) @ (moment / mass)
+    assert told == pytest.approx(true[:3], abs=5e-4)
+    left, right = motion.getCOM("LArm", 2, True), motion.getCOM("RArm", 2, True)
+    assert left[1] > 0.05 > -0.05 > right[1]
+    assert left[2] > 0.1
+
+
+def test_the_summary_lists_joints_and_tasks(motion: Any) -> None:
+    waiting = motion.angleInterpolation("HeadYaw", 1.0, 30.0, True, _async=True)
+    number = the_task(motion)[1]
+    rows = [line.split() for line in motion.getSummary().splitlines()]
+    motion.killAll()
+    waiting.value(TIMEOUT)
+    assert [row[0] for row in rows[2:28]] == BODY
+    knee = next(row for row in rows if row[0] == "LKneePitch")
+    assert [float(value) for value in knee[1:]] == pytest.approx([1.0, *motion.getAngles("LKneePitch", False) * 2], abs=0.02)
+    assert rows[-1] == ["angleInterpolation", str(number)]
 
 
 def test_postures_by_name(posture: Any) -> None:

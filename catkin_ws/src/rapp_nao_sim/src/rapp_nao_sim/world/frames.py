@@ -13,7 +13,7 @@ from rapp_nao_sim.world import legs
 from rapp_nao_sim.world.cameras import CAMERAS
 from rapp_nao_sim.world.errors import Refused
 from rapp_nao_sim.world.legs import Array, Placement
-from rapp_nao_sim.world.model import JOINTS, SOLE, Vector, mirrored
+from rapp_nao_sim.world.model import JOINTS, LINKS, SOLE, Vector, mirrored
 from rapp_nao_sim.world.poses import Pose
 
 TORSO, WORLD, ROBOT = 0, 1, 2  # NAOqi's numbers of the frames
@@ -80,6 +80,17 @@ def transform(name: str, space: int, stance: Stance) -> Array:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = place.rotation, place.position
     return matrix
+
+
+def centre_of_mass(links: Sequence[str], space: int, stance: Stance) -> list[float]:
+    """x, y, z in a space of the centre of mass of some of the links together; raises Refused for an unknown space."""
+    torso = transform("Torso", space, stance)
+    moment = np.zeros(3)
+    for name in links:
+        place = in_torso(_Frame(name), stance.angles)
+        moment += LINKS[name].mass * (place.position + place.rotation @ np.array(LINKS[name].centre))
+    middle = moment / sum(LINKS[name].mass for name in links)
+    return [float(part) for part in torso[:3, :3] @ middle + torso[:3, 3]]
 
 
 def six(matrix: Array) -> list[float]:

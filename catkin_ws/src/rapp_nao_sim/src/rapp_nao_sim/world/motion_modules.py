@@ -9,7 +9,7 @@ import qi
 from rapp_nao_sim.naoqi import NaoqiError
 from rapp_nao_sim.world.arguments import joints, number, spread, ways
 from rapp_nao_sim.world.asking import World, asking
-from rapp_nao_sim.world.model import JOINTS
+from rapp_nao_sim.world.model import BODY, JOINTS
 from rapp_nao_sim.world.moves import Track
 from rapp_nao_sim.world.posture_module import ALRobotPosture
 from rapp_nao_sim.world.reflex_module import Reflexes
@@ -74,6 +74,17 @@ class ALMotion(Walking, Reflexes):
             ends = {"goToPosture": self.__world.stop_posture, "move": self.__world.stop_walk}
             ends.get(task[0], lambda: self.__world.stop_joints(task[2]))()
         return task is not None
+
+    @asking
+    def getSummary(self) -> str:  # noqa: N802
+        """A table of stiffness, command and sensor of each joint, and one of the tasks, as a text."""
+        values = (self.__world.stiffnesses(BODY), self.__world.commanded_angles(BODY), self.__world.joint_angles(BODY))
+        rows = [
+            f"{name:>16} {held:>11.6f} {told:>11.6f} {felt:>11.6f}" for name, held, told, felt in zip(BODY, *values, strict=True)
+        ]
+        tasks = [f"{name:>20} {number:>10}" for name, number, _ in self.__world.tasks()]
+        head = [f"{'Model':-^52}", f"{'JointName':>16} {'Stiffness':>11} {'Command':>11} {'Sensor':>11}"]
+        return "\n".join([*head, *rows, f"{'Tasks':-^52}", f"{'Name':>20} {'ID':>10}", *tasks])
 
     @asking
     def areResourcesAvailable(self, names: str | list[str]) -> bool:  # noqa: N802
