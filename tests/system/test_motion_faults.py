@@ -29,16 +29,17 @@ FELT = 0.2  # s until a touch is felt
 HEARD = 1.0  # s from the end of a word until it is recognised: the end-pointer waits for 0.45 s
 GUARDED = 1.0  # s from the core agent's end to a still robot
 UNSEEN = guard.EVERY * guard.SILENT  # s for the guard to see that the core agent stands still
-BUSY = 1.0  # s that a busy machine may add: three processes have to get their turns
+BUSY = 1.0  # s that a test waits longer before it looks: on a busy machine three processes have to get their turns
 BEHIND = 4.0  # s that it may add where sound is recognised, which falls behind when there is no time for it
 ARRIVED = 0.9  # m, of the 1 m of `move_to`
 SETTINGS = f"""
 register_timeout = 0.5
 joint_speed = 0.02
+posture_speed = 0.3
 heartbeat = {SILENT}
 terminate = 0.5
 """
-MOTIONS = ("move_to", "move_vel", "move_along_path", "move_joint", "take_predefined_posture", "look_at_point")
+MOTIONS = ("move_to", "move_vel", "move_along_path", "move_joint", "take_predefined_posture", "look_at_point", "rest")
 PERMISSIONS = {"core": [f"rapp_{name}" for name in MOTIONS], "cloud": []}
 HEAD, ARM = "HeadYaw", "LShoulderPitch"
 
@@ -71,15 +72,22 @@ def turned(joint: str, sign: float) -> Callable[[Moment, Moment], float]:
 
 
 KINDS = {
-    "move_to": Kind("move_to(1.0, 0.0, 0.0)", walked, 0.08, 0.004),
-    "move_vel": Kind("move_vel(0.08, 0.0, 0.0)", walked, 0.08, 0.004),
-    "move_along_path": Kind("move_along_path([Pose(1.0, 0.0, 0.0, 'base_link')])", walked, 0.08, 0.004),
-    "move_joint": Kind(f"move_joint({HEAD!r}, 1.5, 0.02)", turned(HEAD, 1.0), 0.15, 0.005),
-    "posture": Kind("take_predefined_posture('StandZero', 0.1)", turned(ARM, -1.0), 0.3, 0.02),
-    "look_at": Kind("look_at_point(0.1, 1.0, 0.5)", turned(HEAD, 1.0), 0.15, 0.005),
+    "move_to": Kind("navigation.move_to(1.0, 0.0, 0.0)", walked, 0.08, 0.004),
+    "move_vel": Kind("navigation.move_vel(0.08, 0.0, 0.0)", walked, 0.08, 0.004),
+    "move_along_path": Kind("navigation.move_along_path([Pose(1.0, 0.0, 0.0, 'base_link')])", walked, 0.08, 0.004),
+    "move_joint": Kind(f"navigation.move_joint({HEAD!r}, 1.5, 0.02)", turned(HEAD, 1.0), 0.15, 0.005),
+    "posture": Kind("navigation.take_predefined_posture('StandZero', 0.1)", turned(ARM, -1.0), 0.3, 0.02),
+    "look_at": Kind("navigation.look_at_point(0.1, 1.0, 0.5)", turned(HEAD, 1.0), 0.15, 0.005),
+    "rest": Kind("navigation.rest()", turned(ARM, -1.0), 0.1, 0.02),
+    "goal": Kind("walk_by_action()", walked, 0.08, 0.004),
 }
 BODY = """from rapp_api import Pose, navigation
-navigation.{call}
+from rapp_msgs.msg import MoveToGoal
+def walk_by_action():
+    client = navigation.action_client("rapp_move_to")
+    client.wait_for_server()
+    client.send_goal(MoveToGoal(x=1.0))
+{call}
 while True:
     self.pause(0.2)"""
 
@@ -204,9 +212,13 @@ def in_the_middle(robot: WholeRobot, watch: Watch, name: str) -> Moment:
     return watch.until(lambda now: kind.far(first, now) > kind.middle)
 
 
-def check(what: str, seconds: float, bound: float, busy: float = BUSY) -> None:
+def check(what: str, bound: float, measure: Callable[[], float]) -> None:
+    """How long it takes is at most `bound`: of two tries, as a busy machine may keep one of three processes from its turn."""
+    seconds = measure()
+    if seconds > bound:
+        seconds = min(seconds, measure())
     took[what] = seconds, bound
-    assert seconds <= bound + busy
+    assert seconds <= bound
 
 
 def until_resting(robot: WholeRobot) -> None:
@@ -219,14 +231,18 @@ def until_resting(robot: WholeRobot) -> None:
 
 @pytest.mark.parametrize("name", KINDS)
 def test_a_rapp_killed_in_the_middle_of_a_motion_leaves_a_still_robot(robot: WholeRobot, name: str) -> None:
-    since = len(robot.seen)
-    with watched(robot) as watch:
-        killed = in_the_middle(robot, watch, name)
-        os.kill(runner_of(robot), signal.SIGKILL)
-        robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "It has crashed"), since)
-        until_resting(robot)
-    check(f"RApp killed, {name}", watch.went_on(KINDS[name], killed.time), STOPPED)
-    robot.until_only_the_spare_runs()
+    def measure() -> float:
+        since = len(robot.seen)
+        with watched(robot) as watch:
+            in_the_middle(robot, watch, name)
+            runner, killed = runner_of(robot), watch.moments[-1]
+            os.kill(runner, signal.SIGKILL)
+            robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "It has crashed"), since)
+            until_resting(robot)
+        robot.until_only_the_spare_runs()
+        return watch.went_on(KINDS[name], killed.time)
+
+    check(f"RApp killed, {name}", STOPPED, measure)
 
 
 def test_r03_a_rapp_that_publishes_velocities_past_the_core_agent_moves_nothing(robot: WholeRobot) -> None:
@@ -251,25 +267,32 @@ def test_a_robot_that_was_found_sitting_sits_again_without_motors(robot: WholeRo
 
 
 def test_a_rapp_that_stands_still_in_a_walk_is_stopped(robot: WholeRobot) -> None:
-    since = len(robot.seen)
-    with watched(robot) as watch:
-        frozen = in_the_middle(robot, watch, "move_vel")
-        os.kill(runner_of(robot), signal.SIGSTOP)
-        robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "It does not answer any more"), since)
-        until_resting(robot)
-    check("RApp stands still, move_vel", watch.went_on(KINDS["move_vel"], frozen.time), SILENT + STOPPED)
-    robot.until_only_the_spare_runs()
+    def measure() -> float:
+        since = len(robot.seen)
+        with watched(robot) as watch:
+            in_the_middle(robot, watch, "move_vel")
+            runner, frozen = runner_of(robot), watch.moments[-1]
+            os.kill(runner, signal.SIGSTOP)
+            robot.until(lambda seen: (seen.kind, seen.detail) == ("said", "It does not answer any more"), since)
+            until_resting(robot)
+        robot.until_only_the_spare_runs()
+        return watch.went_on(KINDS["move_vel"], frozen.time)
+
+    check("RApp stands still, move_vel", SILENT + STOPPED, measure)
 
 
 def test_l11_a_hand_on_its_head_stops_a_rapp_in_the_middle_of_a_walk(robot: WholeRobot) -> None:
-    since = len(robot.seen)
-    with watched(robot) as watch:
-        touched = in_the_middle(robot, watch, "move_to")
-        robot.room("touch", "MiddleTactil", 0.3)
-        robot.until(lambda seen: (seen.kind, seen.detail) == ("said", STOPPED_BY_PERSON), since)
-        until_resting(robot)
-    check("head touched, move_to", watch.went_on(KINDS["move_to"], touched.time), FELT + STOPPED)
-    robot.until_only_the_spare_runs()
+    def measure() -> float:
+        since = len(robot.seen)
+        with watched(robot) as watch:
+            touched = in_the_middle(robot, watch, "move_to")
+            robot.room("touch", "MiddleTactil", 0.3)
+            robot.until(lambda seen: (seen.kind, seen.detail) == ("said", STOPPED_BY_PERSON), since)
+            until_resting(robot)
+        robot.until_only_the_spare_runs()
+        return watch.went_on(KINDS["move_to"], touched.time)
+
+    check("head touched, move_to", FELT + STOPPED, measure)
 
 
 @pytest.fixture(scope="module")
@@ -309,7 +332,7 @@ def test_l11_the_spoken_word_stops_a_rapp_in_the_middle_of_a_walk(hearing: Heari
         watch.until(lambda now: walked(watch.moments[0], now) > KINDS["move_to"].middle)
         begun, said = say_stop(hearing, since)
         until_resting(hearing)
-    check("“stop” said, move_to", watch.went_on(KINDS["move_to"], said), HEARD + STOPPED, BEHIND)
+    check("“stop” said, move_to", HEARD + STOPPED + BEHIND, lambda: watch.went_on(KINDS["move_to"], said))
     assert watch.went_on(KINDS["move_to"], begun) > 0.0, "it stood still before it was told to stop"
     assert max(walked(watch.moments[0], moment) for moment in watch.moments) < ARRIVED
     hearing.until_only_the_spare_runs()
@@ -326,29 +349,36 @@ def test_l11_the_spoken_word_is_heard_while_the_rapp_listens_for_others(hearing:
 
 @pytest.mark.parametrize("name", ["move_to", "move_joint"])
 def test_a_core_agent_killed_in_the_middle_of_a_motion_leaves_a_still_robot(robot: WholeRobot, name: str) -> None:
-    with watched(robot) as watch:
-        killed = in_the_middle(robot, watch, name)
-        robot.kill("core_agent")
-        now = watch.until(lambda now: now.time > killed.time + GUARDED + BUSY)
-        watch.until(lambda later: later.time > now.time + 1.0)
-    check(f"core agent killed, {name}", watch.went_on(KINDS[name], killed.time), GUARDED)
-    assert not robot.room("hasFallen")
-    since = len(robot.seen)
-    robot.start("core_agent")
-    robot.until_listening(since)
+    def measure() -> float:
+        with watched(robot) as watch:
+            killed = in_the_middle(robot, watch, name)
+            robot.kill("core_agent")
+            now = watch.until(lambda now: now.time > killed.time + GUARDED + BUSY)
+            watch.until(lambda later: later.time > now.time + 1.0)
+        assert not robot.room("hasFallen")
+        since = len(robot.seen)
+        robot.start("core_agent")
+        robot.until_listening(since)
+        return watch.went_on(KINDS[name], killed.time)
+
+    check(f"core agent killed, {name}", GUARDED, measure)
 
 
 @pytest.mark.parametrize("name", ["move_to", "move_joint"])
 def test_a_core_agent_that_stands_still_in_a_motion_leaves_a_still_robot_and_goes_on(robot: WholeRobot, name: str) -> None:
-    since = len(robot.seen)
-    with watched(robot) as watch:
-        frozen = in_the_middle(robot, watch, name)
-        robot.freeze("core_agent")
-        now = watch.until(lambda now: now.time > frozen.time + UNSEEN + GUARDED + BUSY)
-        watch.until(lambda later: later.time > now.time + 1.0)
-        check(f"core agent stands still, {name}", watch.went_on(KINDS[name], frozen.time), UNSEEN + GUARDED)
-        robot.thaw("core_agent")
-    robot.until(lambda seen: seen.detail.startswith(f"core->dynamic reply rapp_{name}: "), since)  # refused or unreachable
-    robot.until(lambda seen: (seen.kind, seen.detail) == ("said", FAILED), since)
-    until_resting(robot)
-    robot.until_only_the_spare_runs()
+    def measure() -> float:
+        since = len(robot.seen)
+        with watched(robot) as watch:
+            frozen = in_the_middle(robot, watch, name)
+            robot.freeze("core_agent")
+            now = watch.until(lambda now: now.time > frozen.time + UNSEEN + GUARDED + BUSY)
+            watch.until(lambda later: later.time > now.time + 1.0)
+            seconds = watch.went_on(KINDS[name], frozen.time)
+            robot.thaw("core_agent")
+        robot.until(lambda seen: seen.detail.startswith(f"core->dynamic reply rapp_{name}: "), since)  # refused or unreachable
+        robot.until(lambda seen: (seen.kind, seen.detail) == ("said", FAILED), since)
+        until_resting(robot)
+        robot.until_only_the_spare_runs()
+        return seconds
+
+    check(f"core agent stands still, {name}", UNSEEN + GUARDED, measure)
