@@ -74,6 +74,37 @@ def test_the_output_volume_is_a_percentage(device, failing):
         device.setOutputVolume(None)
 
 
+MICROPHONES = ("Front", "Left", "Right", "Rear")
+
+
+def test_closed_microphones_hear_nothing(device, wait_for):
+    energies = [getattr(device, f"get{name}MicEnergy") for name in MICROPHONES]
+    wait_for(lambda: min(energy() for energy in energies) > 0.0)
+    device.closeAudioInputs()
+    try:
+        assert [energy() for energy in energies] == [0.0] * 4
+    finally:
+        device.openAudioInputs()
+    wait_for(lambda: min(energy() for energy in energies) > 0.0)
+
+
+def test_a_muted_loudspeaker_is_silent_and_a_quiet_one_quieter(device, player, loud, wait_for):
+    device.setOutputVolume(100)
+    player.setMasterVolume(1.0)
+    playing = player.playFileInLoop(loud, _async=True)
+    wait_for(lambda: device.getFrontMicEnergy() > 3000)
+    device.muteAudioOut(True)
+    assert device.isAudioOutMuted() is True
+    wait_for(lambda: device.getFrontMicEnergy() < 1700)
+    device.muteAudioOut(False)
+    wait_for(lambda: device.getFrontMicEnergy() > 3000)
+    device.setOutputVolume(1)
+    wait_for(lambda: device.getFrontMicEnergy() < 1700)
+    device.setOutputVolume(100)
+    player.stopAll()
+    playing.value(5000)
+
+
 def test_preferences_that_are_not_simulated_are_refused(device, failing):
     device.setClientPreferences("Samples", 16000, 3, 0)
     with failing("ALAudioDevice::setClientPreferences", "only single channels"):
@@ -145,6 +176,37 @@ def tune(folder):
     return str(folder / "tune.ogg")
 
 
+@pytest.fixture(scope="module")
+def loud(folder):
+    path = folder / "loud.wav"
+    soundfile.write(path, numpy.sin(numpy.arange(32000) * 0.1), 16000)
+    return str(path)
+
+
+def test_a_loaded_file_is_played_paused_and_played_on(player, device, loud, failing, wait_for):
+    number = player.loadFile(loud)
+    assert player.getFileLength(number) == 2.0
+    assert player.getCurrentPosition(number) == 0.0
+    player.pause(number)  # it does not play: no effect
+    playing = player.play(number, _async=True)
+    wait_for(lambda: player.getCurrentPosition(number) > 0.1)
+    player.pause(number)
+    at = player.getCurrentPosition(number)
+    wait_for(lambda: 0.0 < device.getFrontMicEnergy() < 1700)  # time has passed in the room
+    assert player.getCurrentPosition(number) == pytest.approx(at, abs=0.021)
+    assert not playing.isFinished()
+    assert player.play(number) is None
+    playing.value(5000)
+    assert player.getCurrentPosition(number) == 0.0
+    again = player.play(number, 0.5, 0.0, _async=True)
+    wait_for(lambda: player.getCurrentPosition(number) > 0.0)
+    player.unloadFile(number)
+    again.value(5000)
+    for method in ("play", "pause", "getFileLength", "getCurrentPosition", "unloadFile"):
+        with failing(f"ALAudioPlayer::{method}", f"cannot find file {number}"):
+            getattr(player, method)(number)
+
+
 def test_files_are_played_to_their_end(player, tune):
     assert player.getFileLengthFromPath(tune) == pytest.approx(0.2, abs=0.01)
     player.setMasterVolume(0.5)
@@ -171,6 +233,7 @@ def test_a_loop_is_stopped_by_another_call(player, tune, wait_for):
         ("playFileFromPosition", ("{tune}", 5.0), "position must lie in the file"),
         ("playFileInLoop", ("{tune}", 1.0, -3.0), "pan in -1..1"),
         ("getFileLengthFromPath", ("/",), "there is no such file"),
+        ("loadFile", ("/none.wav",), "there is no such file"),
     ],
 )
 def test_playing_what_cannot_be_is_an_error(player, failing, tune, method, arguments, reason):

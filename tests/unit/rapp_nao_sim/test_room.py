@@ -45,6 +45,24 @@ def test_one_voice_begins_while_the_other_goes_on(mixer):
     assert levels == pytest.approx([0.2, 0.5, 0.2, 0.0], abs=0.001)
 
 
+def test_what_is_paused_is_silent_and_goes_on_where_it_was(mixer):
+    sounding = mixer.add(tone(0.5, blocks=2))
+    mixer.block()
+    sounding.paused = True
+    assert [level(mixer.block()) for _ in range(3)] == [0.0] * 3
+    assert not sounding.done.done()
+    sounding.paused = False
+    assert level(mixer.block()) == pytest.approx(0.5, abs=0.001)
+    assert sounding.done.result(0) is True
+
+
+def test_the_loudspeakers_gain_is_for_what_it_plays_alone(mixer):
+    mixer.add(tone(0.2))
+    mixer.add(tone(0.4)).loudspeaker = True
+    mixer.loudspeaker = 0.5
+    assert level(mixer.block()) == pytest.approx(0.4, abs=0.001)
+
+
 def test_too_loud_is_cut_off_and_does_not_wrap(mixer):
     for value in (0.9, 0.9):
         mixer.add(tone(value))

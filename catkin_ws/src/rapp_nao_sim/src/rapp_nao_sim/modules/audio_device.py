@@ -76,6 +76,7 @@ class ALAudioDevice(Module):
         self.__fetch = [fetch]
         self.__room = room
         self.__volume = 100
+        self.__muted = False
         self.__level = 0.0
         self.__recent: list[Block] = []
         self.__lock = threading.Lock()
@@ -94,12 +95,43 @@ class ALAudioDevice(Module):
 
     def getFrontMicEnergy(self) -> float:  # noqa: N802
         """Energy of the last 170 ms at the front microphone."""
-        return self.__level * ENERGY_GAIN
+        return self.__level * ENERGY_GAIN if self.__room.open else 0.0
+
+    def getLeftMicEnergy(self) -> float:  # noqa: N802
+        """As getFrontMicEnergy: the four microphones of this robot hear the same."""
+        return self.getFrontMicEnergy()
+
+    def getRightMicEnergy(self) -> float:  # noqa: N802
+        """As getFrontMicEnergy."""
+        return self.getFrontMicEnergy()
+
+    def getRearMicEnergy(self) -> float:  # noqa: N802
+        """As getFrontMicEnergy."""
+        return self.getFrontMicEnergy()
+
+    def closeAudioInputs(self) -> None:  # noqa: N802
+        """Close the microphones: nobody hears or records anything until they are opened."""
+        self.__room.open = False
+
+    def openAudioInputs(self) -> None:  # noqa: N802
+        """Open the microphones, as they are at the start."""
+        self.__room.open = True
+
+    @quick
+    def muteAudioOut(self, mute: bool) -> None:  # noqa: N802
+        """Whether the loudspeaker is silent; what it would play goes on."""
+        self.__muted = bool(mute)
+        self.__set_loudspeaker()
+
+    def isAudioOutMuted(self) -> bool:  # noqa: N802
+        """Whether the loudspeaker is silent."""
+        return self.__muted
 
     @quick
     def setOutputVolume(self, volume: int) -> None:  # noqa: N802
-        """Volume in percent."""
+        """Volume of the loudspeaker in percent."""
         self.__volume = min(100, max(0, int(volume)))
+        self.__set_loudspeaker()
 
     def getOutputVolume(self) -> int:  # noqa: N802
         """Volume in percent."""
@@ -127,6 +159,9 @@ class ALAudioDevice(Module):
         """End subscribe."""
         with self.__lock:
             self.__end(name)
+
+    def __set_loudspeaker(self) -> None:
+        self.__room.mixer.loudspeaker = 0.0 if self.__muted else self.__volume / 100
 
     def __end(self, name: str) -> None:
         end = self.__clients.pop(name, None)

@@ -32,6 +32,8 @@ class Sounding:
     samples: Samples
     gain: float  # at the microphone
     loop: bool = False
+    loudspeaker: bool = False  # it is the robot's that sounds
+    paused: bool = False
     position: int = 0
     done: "Future[bool]" = field(default_factory=Future)
 
@@ -56,6 +58,7 @@ class Mixer:
 
     def __init__(self, ambient: float, seed: int = 1) -> None:
         self.ambient = ambient
+        self.loudspeaker = 1.0  # gain of what the robot's loudspeaker gives
         self._random = np.random.default_rng(seed)
         self._lock = threading.Lock()
         self._sounding: list[Sounding] = []
@@ -88,7 +91,8 @@ class Mixer:
         mixed = self._random.normal(0, self.ambient / 32768, BLOCK) if self.ambient > 0 else np.zeros(BLOCK)
         with self._lock:
             for sounding in self._sounding:
-                mixed += sounding.gain * sounding.next(BLOCK)
+                if not sounding.paused:
+                    mixed += sounding.gain * (self.loudspeaker if sounding.loudspeaker else 1.0) * sounding.next(BLOCK)
             ended = [s for s in self._sounding if s.ended]
             self._sounding = [s for s in self._sounding if not s.ended]
         for sounding in ended:
@@ -102,6 +106,7 @@ class Room:
 
     def __init__(self, mixer: Mixer) -> None:
         self.mixer = mixer
+        self.open = True  # the microphones; closed, they give nothing to anybody
         self._lock = threading.Lock()
         self._listeners: list[Listener] = []
         self._stop = threading.Event()
@@ -132,7 +137,7 @@ class Room:
         due = time.monotonic()
         while not self._stop.is_set():
             block = self.mixer.block()
-            for listener in self._listeners:
+            for listener in self._listeners if self.open else ():
                 try:
                     listener(block)
                 except (RuntimeError, OSError, ValueError):

@@ -127,7 +127,7 @@ class Mouth:
             if self._present is not saying:
                 return False
             if samples is not None:
-                self._sounding = self._mixer.add(Sounding(samples, saying.gain))
+                self._sounding = self._mixer.add(Sounding(samples, saying.gain, loudspeaker=True))
             self._speaking.set()
             return True
 
