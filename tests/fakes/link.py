@@ -48,7 +48,8 @@ class FakeLink:
             return result
         if name == "install":
             return self._install(arguments["name"])
-        return {"register": {"registered": True, "lease": 30}, "list_rapps": {"rapps": self.catalogue}}[name]
+        catalogue = {"rapps": self.catalogue}
+        return {"register": {"registered": True, "lease": 30}, "list_rapps": catalogue, "mail_told": {"told": True}}[name]
 
     def _install(self, name: str) -> dict[str, Any]:
         if name not in self.shelf:

@@ -185,21 +185,19 @@ class Commands:
             raise Refused("cannot send mail: the robot has no mail account, start the link with --smtp-host")
         letter = await in_thread(self._put, arguments)
         letter = await self._postman.deliver(letter, max(0.0, ticket.remaining - MARGIN))
-        if letter.untold:
-            await self._note_told(letter.message_id, late=False)
         return _told(letter)
 
     async def mail_told(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
-        """{message_id} → {told}: the person knows that a mail which was kept was refused (see `sign_of_life`)."""
-        (message_id,) = take(arguments, message_id=str)
-        await self._note_told(message_id, late=True)
-        return {"told": True}
+        """{message_id, recipients, late} → {told}: it is known that a mail was refused, else `sign_of_life` goes on naming it.
 
-    async def _note_told(self, message_id: str, *, late: bool) -> None:
+        Not `late`: who asked for the mail has had its answer, which may as well have been lost on the way.
+        """
+        message_id, recipients, late = take(arguments, message_id=str, recipients=list, late=bool)
         try:
-            await in_thread(partial(self._outbox.told, message_id, late=late))
+            await in_thread(partial(self._outbox.told, message_id, recipients, late=late))
         except Refused as error:
             _log.error("%s", error)
+        return {"told": True}
 
     async def report(self, arguments: dict[str, Any], _ticket: Ticket) -> Any:
         """{run} → {kept}; it goes to the platform as soon as that can be reached. False: it has it already."""

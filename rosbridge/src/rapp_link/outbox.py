@@ -13,7 +13,7 @@ import errno
 import hashlib
 import logging
 import threading
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -97,17 +97,18 @@ class Outbox:
         letters = [letter for letter in list(self._letters.values()) if letter.untold]  # list: whole in one step, so no lock
         return min(letters, key=lambda letter: letter.queued_at, default=None)
 
-    def told(self, message_id: str, *, late: bool) -> None:
+    def told(self, message_id: str, recipients: Collection[str], *, late: bool) -> None:
         """Write down that a mail's refusal has been told; in memory it is known even when the disk refuses.
 
+        :param recipients: of whom was told; those who are not refused do not count
         :param late: aloud, after the mail had been kept; otherwise to who asked for it, and its content goes
         :raises Refused: the disk refuses
         """
         with self._lock, _translated(self._folder):
             letter = self._letters.get(message_id)
-            if letter is not None and letter.untold:
-                told = letter.told + letter.untold
-                self._note(replace(letter, late=letter.undelivered) if late else replace(letter, told=told))
+            names = tuple(name for name in letter.untold if name in recipients) if letter is not None else ()
+            if letter is not None and names:
+                self._note(replace(letter, late=letter.late + names) if late else replace(letter, told=letter.told + names))
 
     def _note(self, letter: Letter) -> None:
         self._letters[letter.message_id] = letter

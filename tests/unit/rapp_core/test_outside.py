@@ -126,6 +126,25 @@ def test_a_mail_that_is_refused_is_not_tried_again(outside: Outside, agent: Fake
     link.errors["send_mail"] = Refused("cannot deliver to e@home.example: 550")
     with pytest.raises(Refused):
         outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
+    assert link.names().count("send_mail") == 1
+
+
+def test_the_link_hears_that_its_refusal_has_come_and_one_that_does_not_is_no_trouble(
+    outside: Outside, agent: FakeAgent, link: FakeLink
+) -> None:
+    link.errors["send_mail"] = Refused("cannot deliver to e@home.example: 550")
+    link.errors["mail_told"] = Unreachable("away")
+    with pytest.raises(Refused, match="550"):
+        outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
+    (_, told), (name, noted) = link.asked
+    assert (name, noted) == ("mail_told", {"message_id": told["message_id"], "recipients": ["e@home.example"], "late": False})
+
+
+def test_a_refusal_that_finds_its_run_over_is_left_to_be_told_later(outside: Outside, agent: FakeAgent, link: FakeLink) -> None:
+    agent.alive = False
+    link.errors["send_mail"] = Refused("cannot deliver to e@home.example: 550")
+    with pytest.raises(Refused):
+        outside.send_mail(agent, ["e@home.example"], "subject", "body", "")
     assert link.names() == ["send_mail"]
 
 

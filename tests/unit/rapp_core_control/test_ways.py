@@ -45,10 +45,19 @@ def test_a_mail_that_was_refused_after_it_was_kept_is_told_once_before_it_listen
     home.fake.person_says_at(home.clock.time + 20.0, "what time is it", seconds=1.0)
     assert home.round() == KEYWORD
     assert told[0] < home.config.listening_round, "it does not wait for the end of a quiet round"
-    assert ("mail_told", {"message_id": "<1@nao>"}) in home.link.asked
+    assert ("mail_told", {"message_id": "<1@nao>", "recipients": ["e@home.example"], "late": True}) in home.link.asked
     assert [(each.state, each.detail) for each in home.happenings if each.kind == "said"] == [
         ("s3", not_delivered(mail.recipients))
     ]
+
+
+def test_of_one_mail_each_recipient_is_told(home: Home) -> None:
+    home.start()
+    for name in ("e@home.example", "f@home.example"):
+        home.link.undelivered = Undelivered("<1@nao>", (name,))
+        home.step_until(lambda name=name: home.fake.said()[-1:] == [not_delivered((name,))])  # type: ignore[misc]
+    told = [arguments["recipients"] for name, arguments in home.link.asked if name == "mail_told"]
+    assert told == [["e@home.example"], ["f@home.example"]]
 
 
 def test_late_news_that_cannot_be_said_waits_and_the_link_hears_nothing_of_it(home: Home) -> None:

@@ -90,7 +90,7 @@ def test_kept_and_then_refused_it_stays_and_is_to_be_told_over_a_restart_until_i
         assert letter is not None
         assert (letter.state, letter.untold, letter.refused) == ("refused", (ANNA,), {ANNA: NO})
         assert contents(tmp_path) == 1
-    outbox.told("<1@nao>", late=True)
+    outbox.told("<1@nao>", (ANNA,), late=True)
     for box in (outbox, Outbox(tmp_path / "outbox", 5)):
         assert box.untold() is None
         assert known(box).undelivered == (ANNA,)
@@ -109,7 +109,7 @@ def test_given_up_after_days_it_stays_and_is_to_be_told(outbox: Outbox, tmp_path
 def test_one_whose_sender_is_told_at_once_does_not_stay(outbox: Outbox, tmp_path: Path) -> None:
     letter = outbox.put(built(), ME, 0.0)
     outbox.update(letter.after(Outcome(refused={ANNA: NO})))
-    outbox.told("<1@nao>", late=False)
+    outbox.told("<1@nao>", (ANNA, BERT), late=False)
     assert outbox.untold() is None
     assert contents(tmp_path) == 0
 
@@ -117,9 +117,21 @@ def test_one_whose_sender_is_told_at_once_does_not_stay(outbox: Outbox, tmp_path
 def test_of_two_recipients_only_the_one_refused_later_is_told_later(outbox: Outbox, tmp_path: Path) -> None:
     letter = outbox.put(built("<1@nao>", ANNA, BERT), ME, 0.0)
     outbox.update(letter.after(Outcome(refused={ANNA: NO}, later={BERT: LATER})))
-    outbox.told("<1@nao>", late=False)
+    outbox.told("<1@nao>", (ANNA, BERT), late=False)
     outbox.update(known(outbox).after(Outcome(refused={BERT: NO})))
     assert known(outbox).untold == (BERT,)
+    assert contents(tmp_path) == 1
+
+
+def test_one_refused_while_the_other_was_told_is_still_to_be_told(outbox: Outbox, tmp_path: Path) -> None:
+    letter = outbox.put(built("<1@nao>", ANNA, BERT), ME, 0.0)
+    outbox.update(letter.after(Outcome(refused={ANNA: NO}, later={BERT: LATER})))
+    outbox.update(known(outbox).after(Outcome(refused={BERT: NO})))
+    for late in (True, False):
+        outbox.told("<1@nao>", (ANNA,), late=late)
+        assert known(outbox).untold == (BERT,)
+    outbox.told("<1@nao>", (BERT,), late=True)
+    assert outbox.untold() is None
     assert contents(tmp_path) == 1
 
 
@@ -150,7 +162,7 @@ def test_the_sign_of_life_names_the_oldest_until_it_was_told(outbox: Outbox) -> 
         signs.append(sign)
         if sign["undelivered"] is None:
             raise EnoughError
-        outbox.told(sign["undelivered"]["message_id"], late=True)
+        outbox.told(**sign["undelivered"], late=True)
 
     class Platform:
         reachable = True

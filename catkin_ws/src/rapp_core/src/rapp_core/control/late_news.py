@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from rapp_core.control.refusals import not_delivered
 from rapp_core.errors import CoreError
-from rapp_core.ports import Hop
+from rapp_core.ports import Hop, Undelivered
 
 NOTED = 2.0  # s for the link to note that the person knows
 
@@ -19,24 +19,25 @@ class LateNews:
         """`say` gives whether it was said."""
         self._hop = hop
         self._say = say
-        self._said: set[str] = set()  # Message-IDs; the link may not have noted it yet
+        self._said: set[Undelivered] = set()  # the link may not have noted it yet
 
     @property
     def waits(self) -> bool:
         """Whether there is something to say."""
         mail = self._hop.undelivered
-        return mail is not None and mail.message_id not in self._said
+        return mail is not None and mail not in self._said
 
     def tell(self) -> None:
         """Say what there is; what could not be said stays for the next time."""
         mail = self._hop.undelivered
         if mail is None:
             return
-        if mail.message_id not in self._said:
+        if mail not in self._said:
             if not self._say(not_delivered(mail.recipients)):
                 return
-            self._said.add(mail.message_id)
+            self._said.add(mail)
         try:
-            self._hop.request("mail_told", {"message_id": mail.message_id}, NOTED)
+            told = {"message_id": mail.message_id, "recipients": list(mail.recipients), "late": True}
+            self._hop.request("mail_told", told, NOTED)
         except CoreError as error:
             _log.warning("%s", error)
