@@ -1,5 +1,6 @@
 """The modules that speak and recognise words, as a client written for a real NAO calls them."""
 
+import numpy
 import pytest
 
 
@@ -35,6 +36,48 @@ def test_volume_and_speed_are_bounded(tts, failing):
     tts.setParameter("pitchShift", 1.2)
     with failing("ALTextToSpeech::setVolume", "could not convert"):
         tts.setVolume("loud")
+
+
+def test_the_speed_is_told_and_set_back(tts, failing):
+    tts.setParameter("speed", 80.0)
+    assert tts.getParameter("speed") == 80.0
+    tts.resetSpeed()
+    assert tts.getParameter("speed") == 100.0
+    with failing("ALTextToSpeech::getParameter", "cannot find parameter 'pitchShift'"):
+        tts.getParameter("pitchShift")
+
+
+def test_a_voice_has_its_language(tts, failing):
+    assert {"en-us", "pl", "fr-be"} <= set(tts.getAvailableVoices())
+    tts.setVoice("fr-be")
+    assert (tts.getVoice(), tts.getLanguage()) == ("fr-be", "French (Belgium)")
+    tts.setLanguage("Polish")
+    assert tts.getVoice() == "pl"
+    with failing("ALTextToSpeech::setVoice", "voice xyzzy is not installed"):
+        tts.setVoice("xyzzy")
+    tts.setVoice("en-us")
+    assert (tts.getVoice(), tts.getLanguage()) == ("en-us", "English")
+
+
+def test_a_text_is_said_into_a_file(tts, failing, folder):
+    def said(name):
+        tts.sayToFile("good morning", str(folder / name))
+        return numpy.fromfile(folder / name, "<i2").reshape(-1, 2)
+
+    tts.setVolume(1.0)
+    loud = said("loud.raw")
+    assert 0.4 < len(loud) / 22050 < 2.0
+    assert (loud[:, 0] == loud[:, 1]).all()
+    assert loud.std() > 500
+    tts.setVolume(0.25)
+    tts.setParameter("speed", 50.0)
+    slow = said("slow.raw")
+    tts.setVolume(1.0)
+    tts.resetSpeed()
+    assert slow.std() < loud.std() / 2
+    assert len(slow) > 1.3 * len(loud)
+    with failing("ALTextToSpeech::sayToFile", "cannot write /none.raw"):
+        tts.sayToFile("good morning", "/none.raw")
 
 
 @pytest.mark.parametrize("arguments", [(), (5,), ("a", "English", "b")])

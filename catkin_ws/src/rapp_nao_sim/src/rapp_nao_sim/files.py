@@ -1,5 +1,7 @@
 """The robot's file system as clients see it: they may write in some folders only, as on a real robot."""
 
+import os
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,3 +24,15 @@ class Files:
         if path.is_dir():
             raise NaoqiError(f"cannot write {name}: it is a folder")
         return path
+
+
+def write(path: Path, data: bytes) -> None:
+    """Write aside, then rename: nobody sees half a file. Raises NaoqiError."""
+    try:
+        descriptor, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(data)
+        Path(aside).chmod(0o644)
+        Path(aside).replace(path)
+    except OSError as error:
+        raise NaoqiError(f"cannot write {path}: {error.strerror}") from error

@@ -87,7 +87,7 @@ class Host:
         config, mixer = self._config, self._mixer
         modules = {
             "ALMemory": self._memory,
-            "ALTextToSpeech": ALTextToSpeech(self._mouth, config.robot_voice, config.echo),
+            "ALTextToSpeech": ALTextToSpeech(self._mouth, config.robot_voice, config.echo, Files(config.files)),
             "ALSpeechRecognition": ALSpeechRecognition(self._hearing),
             "ALSoundDetection": ALSoundDetection(self._hearing),
             "ALAudioRecorder": ALAudioRecorder(self._room, Files(config.files)),

@@ -1,7 +1,5 @@
 """ALPhotoCapture: pictures of the cameras as files, after NAOqi 2.1."""
 
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +8,7 @@ import cv2
 import numpy as np
 import qi
 
-from rapp_nao_sim.files import Files
+from rapp_nao_sim.files import Files, write
 from rapp_nao_sim.modules.video_clients import Dials
 from rapp_nao_sim.modules.video_device import World
 from rapp_nao_sim.naoqi import Module, NaoqiError, quick, working
@@ -72,7 +70,7 @@ class ALPhotoCapture(Module):
         width, height = SIZES[self.__resolution]
         picture = np.frombuffer(shot.data, np.uint8).reshape(height, width, -1)
         _, data = cv2.imencode(f".{self.__format}", picture)
-        _write(path, data.tobytes())
+        write(path, data.tobytes())
         return str(path)
 
 
@@ -80,15 +78,3 @@ def _one_of(what: str, value: Any, known: Any) -> Any:
     if value not in known:
         raise NaoqiError(f"cannot use {what} {value!r}: known are {', '.join(map(str, known))}")
     return value
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write aside, then rename: nobody sees half a picture."""
-    try:
-        descriptor, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(data)
-        Path(aside).chmod(0o644)
-        Path(aside).replace(path)
-    except OSError as error:
-        raise NaoqiError(f"cannot write {path}: {error.strerror}") from error

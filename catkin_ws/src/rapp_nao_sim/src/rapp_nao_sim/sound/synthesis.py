@@ -18,16 +18,16 @@ class VoiceError(SimError):
     """A text cannot be spoken: no such voice, or espeak-ng is not there."""
 
 
-def speak(text: str, voice: str, speed: int = 150) -> Samples:
-    """Synthesise a text with an espeak-ng voice, at `speed` words per minute; full scale is 1. Raises VoiceError."""
+def speak(text: str, voice: str, speed: int = 150, rate: int = RATE) -> Samples:
+    """Synthesise with an espeak-ng voice: `speed` words per minute, `rate` samples a second, full scale 1. Raises VoiceError."""
     made = espeak("--stdout", "-v", voice, "-s", str(speed), "--", text)
     if not made:
         return np.zeros(0, np.float32)
     try:
-        samples, rate = soundfile.read(io.BytesIO(made), dtype="float64")
+        samples, own = soundfile.read(io.BytesIO(made), dtype="float64")
     except soundfile.LibsndfileError as error:
         raise VoiceError(f"cannot speak with voice {voice!r}: espeak-ng gave no sound: {error}") from error
-    return resample(samples, rate, RATE)
+    return resample(samples, own, rate)
 
 
 def espeak(*words: str) -> bytes:
