@@ -166,7 +166,10 @@ class Subscriptions:
                     return
                 await asyncio.sleep(pause)
                 continue
-            self._mark(entry, publisher, source)
+            if self._subscribed.get(entry.name) is entry:
+                self._mark(entry, publisher, source)
+            else:  # the topic was closed, and may have been opened anew, meanwhile
+                link.close()
             return
 
     def _header(self, entry: Subscribed) -> dict[str, str]:

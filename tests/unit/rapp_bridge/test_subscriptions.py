@@ -78,3 +78,35 @@ def test_a_topic_that_nobody_wants_any_more_is_opened_anew_for_another_type() ->
             held.unsubscribe(client, Unsubscribe("/topic"))
 
     asyncio.run(story())
+
+
+def test_a_connection_of_a_topic_that_was_opened_anew_meanwhile_is_closed(markers: list[Marker]) -> None:
+    async def story() -> None:
+        begun, go_on, over = asyncio.Event(), asyncio.Event(), asyncio.Event()
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            begun.set()
+            await go_on.wait()
+            writer.write(HEADER)
+            while await reader.read(1000):
+                pass
+            over.set()
+
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        master: Any = None
+        client: Any = object()
+        held = subscriptions.Subscriptions(Config(), master, Blocking(1))
+        for kind in ("std_msgs/String", "std_msgs/Int32"):
+            waiting = held.subscribe(client, Subscribe("/topic", kind))
+            assert waiting is not None
+            await waiting
+            if not begun.is_set():
+                held.connect("/topic", PUBLISHER, server.sockets[0].getsockname())
+                await begun.wait()
+                held.unsubscribe(client, Unsubscribe("/topic"))
+        go_on.set()
+        await asyncio.wait_for(over.wait(), 10)
+        assert not markers
+        server.close()
+
+    asyncio.run(story())
