@@ -109,6 +109,15 @@ def test_what_was_revoked_is_not_run_and_still_understood(platform: Platform, li
     assert platform.rapps()["parrot"].keywords == ("parrot",)
 
 
+def test_what_was_revoked_is_never_run_beside_another_version_on_offer(platform: Platform, link: FakeLink, tmp_path: Path) -> None:
+    install_rapp(tmp_path, "parrot")
+    link.answers["list_rapps"] = {"rapps": [entry("parrot", "2.0.0")], "revoked": ["parrot"]}  # the link cannot remove it
+    for _ in range(3):
+        platform.attempt()
+        known = platform.rapps()["parrot"]
+        assert (known.version, known.path) == ("2.0.0", None)
+
+
 def test_a_revoked_rapp_that_is_on_offer_again_is_as_any_other(platform: Platform, link: FakeLink, tmp_path: Path) -> None:
     path = install_rapp(tmp_path, "parrot")
     link.answers["list_rapps"] = {"rapps": [], "revoked": ["parrot"]}

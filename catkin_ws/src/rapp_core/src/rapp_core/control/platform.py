@@ -58,7 +58,7 @@ class Platform:
             if not self._registered:
                 self._hop.request("register", robot, config.register_timeout)
                 self._registered = True
-            here = self._installed()
+            here = installed(config.home, config.language)
             catalogue = self._hop.request("list_rapps", {}, config.register_timeout)
             known = map(self._known, catalogue["rapps"])
             offered = {entry.name: entry for entry in known if entry is not None}
