@@ -18,6 +18,7 @@ from rapp_cloud.config import PREFIX, CloudConfig, load_config
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import PASSPHRASE, passphrase_from
 from rapp_cloud.memory import open_memory
+from rapp_cloud.shelf import Shelf
 from rapp_cloud.tls import CERTIFICATE, make_certificate, may_be_made_anew
 from rapp_cloud.witness import noting_offers
 from rapp_hop.errors import HopError
@@ -121,9 +122,16 @@ def _publish(words: list[str]) -> int:
     options = parser.parse_args(words)
     shelf = open_shelf(options.data, passphrase_from(os.environ))
     with noting_offers(options.data, shelf, load_config(options.data, {}, os.environ).database):
-        for folder in options.sources:
-            manifest = shelf.publish(build(folder))
-            print(f"on offer: {manifest.name} {manifest.version}")
+        return max([_offer(shelf, folder) for folder in options.sources])
+
+
+def _offer(shelf: Shelf, folder: Path) -> int:
+    try:
+        manifest = shelf.publish(build(folder))
+    except HopError as error:  # the others may be right
+        print(error, file=sys.stderr)
+        return 1
+    print(f"on offer: {manifest.name} {manifest.version}")
     return 0
 
 

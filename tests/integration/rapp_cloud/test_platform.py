@@ -209,6 +209,8 @@ def test_s20_the_same_version_with_other_bytes_is_refused(platform: Platform, tm
     ]
     started = platform.command("--data", str(platform.data), "--port", "0", "--publish", str(source))
     assert (started.returncode, started.stdout) == (1, "")
+    both = platform.command("publish", "--data", str(platform.data), str(source), str(source_folder(tmp_path, "clock")))
+    assert (both.returncode, both.stdout, both.stderr.splitlines()[0]) == (1, "on offer: clock 1.0.0\n", again.stderr.strip())
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
