@@ -2,6 +2,7 @@
 
 import asyncio
 import shutil
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from rapp_cloud.shelf import Shelf
 from rapp_hop.errors import Unreachable
 from rapp_hop.hz.archive import build
 from rapp_hop.hz.delivery import Delivery
-from rapp_hop.hz.trust import Attack, Untrusted
+from rapp_hop.hz.trust import Attack, TrustedStore, Untrusted
 
 NAMES = {"hello": "rapp", "clock": "maria"}  # RApps by publisher
 
@@ -87,6 +88,22 @@ def test_a_robot_that_was_away_keeps_only_what_the_new_key_has_signed_again(robo
     assert robot.drop() == gone
     assert robot.install("clock") == again
     assert robot.drop() == set()
+
+
+def test_a_new_version_that_comes_while_the_old_one_is_found_revoked_stays(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot.shelf.custody.revoke("maria")
+    robot.shelf.custody.add("maria")
+    robot.publish("clock", "1.0.1")
+    look = TrustedStore.revoked
+
+    def look_and_install(store: TrustedStore, installed: Mapping[str, Collection[str]]) -> frozenset[str]:
+        found = look(store, installed)
+        robot.install("clock")
+        return found
+
+    monkeypatch.setattr(TrustedStore, "revoked", look_and_install)
+    assert robot.drop() == set()
+    assert robot.rapps["clock"] == "1.0.1"
 
 
 def test_the_version_before_a_new_one_goes_too(robot: Robot) -> None:

@@ -6,7 +6,7 @@ bytes. Different RApps are installed side by side; who asks for one that is bein
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -88,18 +88,20 @@ class Delivery:
     async def drop_revoked(self) -> frozenset[str]:
         """Remove the RApps that are signed by revoked keys only; return their names, also of those the disk would not let go.
 
-        One that runs goes too: its run has a copy.
+        One that runs goes too: its run has a copy. One of which another version has come meanwhile is left to the next look.
 
         :raises HopError: when the store cannot be believed or reached; nothing was removed then
         """
-        if not await asyncio.to_thread(self.folder.names):
+        here = await asyncio.to_thread(self._versions)
+        if not here:
             return frozenset()
-        transport = LoopTransport(self._client, asyncio.get_running_loop(), self._limits)
-        found = await in_thread(transport, self._revoked, transport)
-        for name in found:
+        transport, gone = LoopTransport(self._client, asyncio.get_running_loop(), self._limits), set()
+        for name in await in_thread(transport, self._revoked, transport, here):
             async with self._alone(name):
-                await asyncio.to_thread(self._drop, name)
-        return found
+                if await asyncio.to_thread(self.folder.versions, name) == here[name]:
+                    await asyncio.to_thread(self._drop, name)
+                    gone.add(name)
+        return frozenset(gone)
 
     async def remove(self, name: str) -> bool:
         """Remove a RApp and what has come of its next version; false when it was not there.
@@ -159,8 +161,11 @@ class Delivery:
     def _store(self, transport: LoopTransport) -> TrustedStore:
         return TrustedStore(transport, f"{self._client.base_url}/tuf", self._root, self._home / "trust", self._limits.package)
 
-    def _revoked(self, transport: LoopTransport) -> frozenset[str]:
-        return self._store(transport).revoked({name: self.folder.versions(name) for name in self.folder.names()})
+    def _versions(self) -> dict[str, tuple[str, ...]]:
+        return {name: self.folder.versions(name) for name in self.folder.names()}
+
+    def _revoked(self, transport: LoopTransport, here: Mapping[str, tuple[str, ...]]) -> frozenset[str]:
+        return self._store(transport).revoked(here)
 
     def _drop(self, name: str) -> None:
         try:
