@@ -54,6 +54,7 @@ def _restore(make: Make, words: list[str]) -> int:
     done = restore(options.data, _database(options.data), options.file, passphrase_from(os.environ))
     print(f"{options.data} is the platform of {datetime.fromtimestamp(done.at, UTC):%F %T} UTC")
     print("what was published after that is not on offer: publish it again as it was, or with a higher version")
+    print("what was revoked after that is good again, tokens and publishers' keys: revoke it again")
     for package in done.expired:
         print(refused_until_renewed(package))
     if done.left:

@@ -105,6 +105,7 @@ def test_the_commands(tmp_path: Path) -> None:
     assert (made.returncode, made.stderr) == (0, "")
     back = _command("restore", "--data", str(again), str(file))
     assert (back.returncode, back.stderr) == (0, "")
+    assert "publish it again" in back.stdout and "revoke it again" in back.stdout
     assert _content(again, None) == _content(data, None)
     twice = _command("restore", "--data", str(again), str(file))
     assert twice.returncode == 1
