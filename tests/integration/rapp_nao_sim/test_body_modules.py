@@ -117,7 +117,10 @@ def test_sonars_measure_while_somebody_is_subscribed(memory: Any, robot: Any, mo
     assert [left, right] == pytest.approx([1.5 - true[0] - 0.06] * 2, abs=0.1)
     assert nothing is None
     assert sonar.getFilteredValues() == [right, left]
-    assert [row[0] for row in sonar.getSubscribersInfo()] == ["test"]
+    sonar.updatePeriod("test", 200)
+    sonar.updatePrecision("test", 0.5)
+    assert sonar.getSubscribersInfo() == [["test", 200, 0.5]]
+    assert sonar.getCurrentPeriod() == 100
     sonar.unsubscribe("test")
     with failing("ALSonar::unsubscribe", "is not subscribed"):
         sonar.unsubscribe("test")

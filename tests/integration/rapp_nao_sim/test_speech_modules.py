@@ -137,6 +137,39 @@ def test_what_has_nothing_to_set_is_accepted(texted, recognition):
     texted.service("ALSoundDetection").setParameter("Sensitivity", 0.7)
 
 
+@pytest.mark.parametrize(
+    ("name", "events", "keys"),
+    [
+        ("ALSpeechRecognition", ["WordRecognized", "SpeechDetected"], ["LastWordRecognized"]),
+        ("ALSoundDetection", ["SoundDetected"], []),
+    ],
+)
+def test_what_hears_tells_its_subscribers_and_what_it_tells(texted, failing, name, events, keys):
+    module = texted.service(name)
+    assert (module.getEventList(), module.getMemoryKeyList()) == (events, keys)
+    assert module.getOutputNames() == [*events, *keys]
+    assert module.getCurrentPeriod() == 20
+    module.subscribe("a", 500, 0.5)
+    module.subscribe("b")
+    assert module.getSubscribersInfo() == [["a", 500, 0.5], ["b", 20, 0.0]]
+    module.updatePeriod("a", 100)
+    module.updatePrecision("a", 1.0)
+    assert (module.getMyPeriod("a"), module.getMyPrecision("a")) == (100, 1.0)
+    module.unsubscribe("a")
+    module.unsubscribe("b")
+    assert module.getSubscribersInfo() == []
+    for method, value in (("updatePeriod", [100]), ("updatePrecision", [1.0]), ("getMyPeriod", []), ("getMyPrecision", [])):
+        with failing(f"{name}::{method}", "a is not subscribed"):
+            getattr(module, method)("a", *value)
+
+
+def test_a_pause_is_told(recognition):
+    recognition.pause(True)
+    assert recognition.isPaused() is True
+    recognition.pause(False)
+    assert recognition.isPaused() is False
+
+
 def test_unsubscribing_what_never_subscribed_is_no_error(texted, recognition):
     recognition.unsubscribe("nobody")
     texted.service("ALSoundDetection").unsubscribe("nobody")

@@ -1,10 +1,9 @@
 """ALSonar: the sonars measure while somebody is subscribed."""
 
-import threading
-
 import qi
 
-from rapp_nao_sim.naoqi import Module, NaoqiError, working
+from rapp_nao_sim.modules.extractor import Extractor
+from rapp_nao_sim.naoqi import NaoqiError, working
 from rapp_nao_sim.world.process import WorldClient
 
 PERIOD = 100  # ms between two measures
@@ -14,50 +13,20 @@ EVENTS = [f"Sonar{side}{what}" for side in SIDES for what in ("Detected", "Nothi
 
 
 @qi.multiThreaded()
-class ALSonar(Module):
+class ALSonar(Extractor):
     """Keys Device/SubDeviceList/US/Left|Right/Sensor/Value (m; 5.0: no echo); events SonarLeftDetected and its like."""
 
     def __init__(self, world: WorldClient) -> None:
         self.__world = world
-        self.__lock = threading.Lock()
-        self.__subscribers: set[str] = set()
+        wanting: set[str] = set()
 
-    @working
-    def subscribe(self, name: str, *_period_and_precision: float) -> None:
-        """Have the sonars measure for `name`."""
-        with self.__lock:
-            self.__subscribers.add(name)
-            self.__world.set_sonar(True)
-
-    @working
-    def unsubscribe(self, name: str) -> None:
-        """Not for `name` any more; the last one stops them."""
-        with self.__lock:
-            if name not in self.__subscribers:
+        def change(name: str, on: bool) -> None:
+            if not on and name not in wanting:
                 raise NaoqiError(f"{name} is not subscribed")
-            self.__subscribers.discard(name)
-            self.__world.set_sonar(bool(self.__subscribers))
+            (wanting.add if on else wanting.discard)(name)
+            world.set_sonar(bool(wanting))
 
-    def getSubscribersInfo(self) -> list[list[object]]:  # noqa: N802
-        """Name, period and precision of each subscriber."""
-        with self.__lock:
-            return [[name, PERIOD, 0.0] for name in sorted(self.__subscribers)]
-
-    def getCurrentPeriod(self) -> int:  # noqa: N802
-        """ms between two measures."""
-        return PERIOD
-
-    def getOutputNames(self) -> list[str]:  # noqa: N802
-        """What it tells in ALMemory: the same as getEventList and getMemoryKeyList together."""
-        return [*EVENTS, *KEYS]
-
-    def getEventList(self) -> list[str]:  # noqa: N802
-        """The events it raises."""
-        return list(EVENTS)
-
-    def getMemoryKeyList(self) -> list[str]:  # noqa: N802
-        """The keys it writes."""
-        return list(KEYS)
+        super().__init__(change, PERIOD, EVENTS, KEYS)
 
     @working
     def getFilteredValues(self) -> list[float]:  # noqa: N802

@@ -2,15 +2,24 @@
 
 import qi
 
-from rapp_nao_sim.naoqi import Module, NaoqiError, quick, working
+from rapp_nao_sim.modules.extractor import Extractor
+from rapp_nao_sim.naoqi import NaoqiError, quick, working
+from rapp_nao_sim.sound.room import BLOCK
+from rapp_nao_sim.sound.samples import RATE
 from rapp_nao_sim.speech.hearing import Hearing
+
+PERIOD = 1000 * BLOCK // RATE  # ms: the ears listen block by block
 
 
 @qi.multiThreaded()
-class ALSpeechRecognition(Module):
+class ALSpeechRecognition(Extractor):
     """Recognition of words of a small vocabulary."""
 
     def __init__(self, hearing: Hearing) -> None:
+        def change(name: str, on: bool) -> None:
+            (hearing.subscribe if on else hearing.unsubscribe)(name)
+
+        super().__init__(change, PERIOD, ["WordRecognized", "SpeechDetected"], ["LastWordRecognized"])
         self.__hearing = hearing
         self.__language = "English"
 
@@ -25,17 +34,13 @@ class ALSpeechRecognition(Module):
         """As setVocabulary(words, False)."""
         return self.setVocabulary(words, False)
 
-    def subscribe(self, name: str, *_period_precision: float) -> None:
-        """Start raising WordRecognized."""
-        self.__hearing.subscribe(name)
-
-    def unsubscribe(self, name: str) -> None:
-        """Stop raising WordRecognized."""
-        self.__hearing.unsubscribe(name)
-
     def pause(self, paused: bool) -> None:
         """Pause recognition, or go on with it."""
         self.__hearing.pause(bool(paused))
+
+    def isPaused(self) -> bool:  # noqa: N802
+        """Whether recognition is paused."""
+        return self.__hearing.paused
 
     @quick
     def setLanguage(self, language: str) -> None:  # noqa: N802
@@ -62,19 +67,11 @@ class ALSpeechRecognition(Module):
 
 
 @qi.multiThreaded()
-class ALSoundDetection(Module):
+class ALSoundDetection(Extractor):
     """Starts (type 1) and ends (type 0) of sounds, raised as SoundDetected."""
 
     def __init__(self, hearing: Hearing) -> None:
-        self.__hearing = hearing
-
-    def subscribe(self, name: str, *_period_precision: float) -> None:
-        """Start raising SoundDetected."""
-        self.__hearing.detect(name, True)
-
-    def unsubscribe(self, name: str) -> None:
-        """Stop raising SoundDetected."""
-        self.__hearing.detect(name, False)
+        super().__init__(hearing.detect, PERIOD, ["SoundDetected"])
 
     def setParameter(self, _name: str, _value: float) -> None:  # noqa: N802
         """Accepted: the sensitivity adapts to the room by itself."""

@@ -53,7 +53,7 @@ class Hearing:
         self._detectors: set[str] = set()
         self._vocabulary: list[str] = []
         self._number = 0  # of the vocabulary
-        self._paused = False
+        self.paused = False  # see `pause`
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="hearing", daemon=True)
 
@@ -98,7 +98,7 @@ class Hearing:
                 _log.warning("a sound is not recognised: %d wait already", MOST)
 
     def _listens(self) -> bool:
-        return bool(self._subscribers) and not self._paused and bool(self._vocabulary)
+        return bool(self._subscribers) and not self.paused and bool(self._vocabulary)
 
     @property
     def listening(self) -> bool:
@@ -131,7 +131,7 @@ class Hearing:
     def pause(self, paused: bool) -> None:
         """Stop listening for a while."""
         with self._lock:
-            self._paused = paused
+            self.paused = paused
 
     def set_vocabulary(self, words: Sequence[str]) -> None:
         """Change the vocabulary. Raises HearingError while listening, EarsError for words nobody can pronounce."""
