@@ -1,6 +1,9 @@
 """`./rapp remove` when there is nothing to remove, or nobody to do it."""
 
 import argparse
+import asyncio
+import json
+from typing import Any
 
 import pytest
 
@@ -25,6 +28,24 @@ def test_what_is_not_there_is_told(home: Home, name: str, told: str) -> None:
     with pytest.raises(CommandError, match=told):
         remove.run(argparse.Namespace(rapp=name, home=home.folder))
     assert (home.robot / "rapps" / "clock").exists()
+
+
+class Bridge:
+    """Sends these messages, and leaves."""
+
+    def __init__(self, *messages: dict[str, Any]) -> None:
+        self.messages = list(messages)
+
+    async def read_message(self) -> str | None:
+        return json.dumps(self.messages.pop(0)) if self.messages else None
+
+
+def test_what_the_bridge_tells_of_itself_is_not_the_end() -> None:
+    status = {"op": "status", "level": "error", "msg": "cannot reach the ROS master"}
+    done = {"op": "publish", "topic": "/rapp_hop/events", "msg": {"job": "j", "kind": remove.DONE, "message": ""}}
+    bridge: Any = Bridge(status, done, status)
+    asyncio.run(remove._ended(bridge, {"j"}))
+    assert bridge.messages == [status]
 
 
 def test_a_robot_that_is_not_up_is_to_be_started(home: Home) -> None:

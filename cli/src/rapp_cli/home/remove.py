@@ -78,7 +78,7 @@ async def _ended(socket: WebSocketClientConnection, asked: set[str]) -> None:
         message: dict[str, Any] = json.loads(text)
         if message["op"] == "service_response" and message["result"] and not message["values"]["accepted"]:
             raise CommandError(message["values"]["message"])
-        event = message.get("msg", {})
+        event = message["msg"] if message["op"] == "publish" else {}  # the bridge's own status has a text there
         if event.get("job") in asked and event["kind"] == FAILED:
             raise CommandError(event["message"])
         if event.get("job") in asked and event["kind"] == DONE:
