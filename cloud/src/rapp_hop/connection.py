@@ -165,7 +165,8 @@ class Message(HTTPMessageDelegate):
             if answer is not None and not self.stream.closed():
                 without_body = self._head is not None and self._head.method == "HEAD"
                 await send(self.stream, answer, self._keep, without_body, self._version, self._site.send_timeout)
-                await self._linger()
+                if not self._whole:
+                    await self._linger()
                 self._line.finish()
                 if not self._keep:
                     self.stream.close()
@@ -182,7 +183,7 @@ class Message(HTTPMessageDelegate):
 
     async def _linger(self) -> None:
         """Drop what still comes, for a while: closed at once, the connection is reset, and the answer with it."""
-        if self._whole or self._head is None or "expect" in self._head.headers or self.stream.closed():
+        if self._head is None or "expect" in self._head.headers or self.stream.closed():
             return
         self._end()
         self._over = asyncio.Event()
