@@ -73,6 +73,16 @@ def test_a_robot_that_does_not_even_rest_is_told_of_and_put_back_another_time(
     assert bench.context.calls.take_before() == "Stand"
 
 
+def test_a_robot_that_is_away_is_put_back_another_time(bench: Bench) -> None:
+    bench.fake.motion.at = "Sit"
+    bench.call("rapp_take_predefined_posture", posture="StandInit", speed=0.0)
+    for here in (False, True):
+        bench.fake.body.here = here
+        bench.executor.put_back()
+        bench.go_on()
+    assert (bench.fake.motion.at, bench.fake.motion.awake) == ("Sit", False)
+
+
 def test_a_way_back_that_a_person_stops_is_not_followed_by_a_rest(bench: Bench) -> None:
     bench.clock.at(3.0, lambda: bench.call("rapp_move_stop"))  # a posture takes 2 s
     assert leave(bench, "Sit") == ["posture Sit at 0.6", "stop motion"]

@@ -67,7 +67,8 @@ class Executor:
         try:
             posture = before if comes_back(self._context, before) else ""
         except CoreError as error:
-            _log.warning("%s", error)
+            _log.warning("the robot is not back at rest: %s", error)
+            self._context.calls.keep_before(before)
             return
         self._aside(lambda: self._come_back(before, posture))
 
