@@ -76,7 +76,7 @@ class Connection(asyncio.Protocol):
         self._sender = Sender(transport, config.queue_limit, hall.background, self.tell, self.close)
         self._reader = Reader(config.frame_limit)
         self._received: deque[Received] = deque()
-        self._unserved = 0  # bytes that have come since all messages were served
+        self._unserved, self._most = 0, config.frame_limit  # bytes that have come since all messages were served
         self._busy = self._turn_is_set = self._over = self._gone = False
         self._second, self._count = 0.0, 0  # of the rate limit
         self._heard = True
@@ -205,7 +205,7 @@ class Connection(asyncio.Protocol):
         if not self._received:
             self._unserved = 0
         if not self._over:
-            self._read_on(len(self._received) < BACKLOG and self._unserved <= self._hall.config.frame_limit)
+            self._read_on(len(self._received) < BACKLOG and self._unserved <= self._most)
 
     def _take_turn_later(self) -> None:
         if not self._turn_is_set:
