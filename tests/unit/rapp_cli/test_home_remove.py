@@ -48,6 +48,40 @@ def test_what_the_bridge_tells_of_itself_is_not_the_end() -> None:
     assert bridge.messages == [status]
 
 
+class Silent:
+    """A bridge that takes all and answers nothing."""
+
+    def __init__(self) -> None:
+        self.written: list[dict[str, Any]] = []
+
+    async def write_message(self, text: str) -> None:
+        self.written.append(json.loads(text))
+
+    async def read_message(self) -> str:
+        await asyncio.Event().wait()
+        raise AssertionError
+
+    def close(self) -> None:
+        pass
+
+
+def test_the_link_is_asked_now_and_then_and_none_of_its_jobs_outlives_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
+    silent = Silent()
+
+    async def connect(_bridge: str, connect_timeout: float) -> Silent:
+        return silent
+
+    monkeypatch.setattr(remove, "websocket_connect", connect)
+    for name, seconds in (("PATIENCE", 0.5), ("AGAIN", 0.01), ("MARGIN", 0.001)):
+        monkeypatch.setattr(remove, name, seconds)
+    with pytest.raises(TimeoutError):
+        asyncio.run(remove._remove("ws://bridge", "clock"))
+    patience = [wish["args"]["timeout"] for wish in silent.written if wish["op"] == "call_service"]
+    assert max(patience) < 0.5
+    assert patience == sorted(set(patience), reverse=True)
+    assert len(patience) < 8  # their pauses double
+
+
 def test_a_robot_that_is_not_up_is_to_be_started(home: Home) -> None:
     install_rapp(home.robot, "clock")
     home.keep(Settings("nao", None, None, None, (), {"rosbridge": 1}))

@@ -17,6 +17,8 @@ from rapp_hop.hz.install import RappFolder
 
 PATIENCE = 20.0  # s for all of it
 AGAIN = 1.0  # s until the link is asked anew: it may just be starting, or its event was before the bridge had joined the topic
+LONGEST = 4.0  # s between two such, which may all wait for an installation
+MARGIN = 1.0  # s before the end at which the link gives up: nothing is removed once the caller was told that it is not
 EVENTS = {"op": "subscribe", "topic": "/rapp_hop/events", "type": "rapp_msgs/HopEvent", "queue_length": 100}
 DONE, FAILED = 1, 2  # kinds of a HopEvent
 
@@ -53,21 +55,23 @@ def run(options: argparse.Namespace) -> int:
 
 
 async def _remove(bridge: str, name: str) -> None:
-    """Ask until an event tells the end; what is removed already may be removed again."""
+    """Ask until an event tells the end, with growing pauses; what is removed already may be removed again."""
     asked: set[str] = set()
-    async with asyncio.timeout(PATIENCE):
+    now, again = asyncio.get_running_loop().time, AGAIN
+    end = now() + PATIENCE
+    async with asyncio.timeout_at(end):
         socket = await websocket_connect(bridge, connect_timeout=PATIENCE)
         try:
             await socket.write_message(json.dumps(EVENTS))
             while True:
                 asked.add(job := uuid.uuid4().hex)
-                arguments = {"job": job, "arguments": json.dumps({"name": name}), "timeout": PATIENCE}
+                arguments = {"job": job, "arguments": json.dumps({"name": name}), "timeout": max(0.1, end - now() - MARGIN)}
                 await socket.write_message(json.dumps({"op": "call_service", "service": "/rapp_hop/remove", "args": arguments}))
                 try:
-                    async with asyncio.timeout(AGAIN):
+                    async with asyncio.timeout(again):
                         return await _ended(socket, asked)
                 except TimeoutError:
-                    continue
+                    again = min(2 * again, LONGEST)
         finally:
             socket.close()
 
