@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from rapp_nao_sim.world.errors import Refused
@@ -56,6 +57,20 @@ def test_the_hips_twin_joints_move_as_one(world: WorldClient) -> None:
     assert world.move_joints(["LHipYawPitch"], [[-0.3]], [[0.3]])
     left, right = world.commanded_angles(["LHipYawPitch", "RHipYawPitch"])
     assert left == right == pytest.approx(-0.3)
+
+
+def test_a_leg_stops_at_the_other(world: WorldClient) -> None:
+    hips = ["LHipRoll", "RHipRoll"]
+    assert world.set_posture("LyingBack", 1.0)
+    world.move_joints(hips, [[0.0], [0.0]], [[0.5], [0.5]])
+    assert world.commanded_angles(hips) == pytest.approx([0.0, 0.0])
+    world.move_joints(hips, [[-0.37], [0.37]], [[1.0], [1.0]])
+    time.sleep(0.3)
+    torso = np.linalg.inv(np.array(world.link("torso")).reshape(4, 4))
+    left, right = ((torso @ np.array(world.link(name)).reshape(4, 4))[1, 3] for name in ("LAnkle", "RAnkle"))
+    assert left > right + 0.03
+    world.move_joints(hips, [[0.1], [-0.1]], [[0.5], [0.5]])
+    assert world.commanded_angles(hips) == pytest.approx([0.1, -0.1])
 
 
 def test_an_interpolation_ends_at_its_last_point(world: WorldClient) -> None:

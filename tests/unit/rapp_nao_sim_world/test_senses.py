@@ -1,6 +1,7 @@
 """What is made of contacts, echoes, tilt and joints before it reaches ALMemory."""
 
 import math
+from itertools import pairwise
 
 import pytest
 
@@ -94,23 +95,39 @@ def test_lying_down_slowly_or_lying_from_the_beginning_is_no_fall() -> None:
 
 
 @pytest.mark.parametrize("name", POSTURES)
-def test_no_posture_has_an_arm_in_the_body(name: str) -> None:
-    assert all(selfcollision.depth(side, POSTURES[name].angles) < 0 for side in "LR")
+def test_no_posture_has_an_arm_in_the_body_or_a_leg_in_the_other(name: str) -> None:
+    assert all(selfcollision.depth(chain, POSTURES[name].angles) < 0 for chain in selfcollision.HELD)
 
 
 def test_an_arm_stops_before_the_body_and_may_leave_it() -> None:
     free = dict(POSTURES["StandInit"].angles)
     inside = free | {"LShoulderPitch": 1.5, "LShoulderRoll": -0.31, "LElbowRoll": -1.5, "LElbowYaw": 0.0}
     deeper = inside | {"LShoulderRoll": -0.314}
-    assert selfcollision.depth("L", inside) > 0.03
-    assert selfcollision.held("L", free, inside) and selfcollision.held("L", inside, deeper)
-    assert not selfcollision.held("L", inside, free) and not selfcollision.held("R", free, inside)
+    assert selfcollision.depth("LArm", inside) > 0.03
+    assert selfcollision.held("LArm", free, inside) and selfcollision.held("LArm", inside, deeper)
+    assert not selfcollision.held("LArm", inside, free) and not selfcollision.held("RArm", free, inside)
+
+
+def test_legs_stop_at_each_other_and_may_part() -> None:
+    free = dict(POSTURES["LyingBack"].angles)
+    crossed = free | {"LHipRoll": -0.37, "RHipRoll": 0.37}
+    deeper = crossed | {"RHipRoll": 0.379}
+    assert selfcollision.held("Legs", free, crossed) and selfcollision.held("Legs", crossed, deeper)
+    assert not selfcollision.held("Legs", crossed, free)
+
+
+@pytest.mark.parametrize("name", POSTURES)
+@pytest.mark.parametrize("other", POSTURES)
+def test_joints_go_from_posture_to_posture_without_being_held_at_the_legs(name: str, other: str) -> None:
+    start, goal = POSTURES[name].angles, POSTURES[other].angles
+    way = [{joint: angle + (goal[joint] - angle) * part / 20 for joint, angle in start.items()} for part in range(21)]
+    assert not [step for step, (here, there) in enumerate(pairwise(way)) if selfcollision.held("Legs", here, there)]
 
 
 def test_arms_mirror_each_other() -> None:
     turned = {"LShoulderRoll": -0.3, "LElbowRoll": -1.0, "LElbowYaw": -0.4}
     mirrored = {"R" + name[1:]: -angle for name, angle in turned.items()}
     free = dict(POSTURES["StandInit"].angles)
-    left, right = selfcollision.depth("L", free | turned), selfcollision.depth("R", free | mirrored)
+    left, right = selfcollision.depth("LArm", free | turned), selfcollision.depth("RArm", free | mirrored)
     assert left == pytest.approx(right, abs=1e-6)
-    assert not math.isclose(left, selfcollision.depth("L", free))
+    assert not math.isclose(left, selfcollision.depth("LArm", free))

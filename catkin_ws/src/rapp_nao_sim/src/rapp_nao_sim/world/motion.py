@@ -14,7 +14,7 @@ from rapp_nao_sim.world.frames import Stance
 from rapp_nao_sim.world.model import BODY, CHAINS
 from rapp_nao_sim.world.moves import check, clip, direct, posture_time, through, twin
 from rapp_nao_sim.world.postures import LEAN_TOLERANCE, Posture, family, recognise
-from rapp_nao_sim.world.selfcollision import held
+from rapp_nao_sim.world.selfcollision import HELD, held
 from rapp_nao_sim.world.tracks import Answer, Tracks
 from rapp_nao_sim.world.walk import Walk, ready
 
@@ -37,7 +37,7 @@ class Motion:
         self._change: Change | None = None
         self._moved = True
         self.walk = Walk(answer)
-        self.protected = set("LR")  # arms that are kept out of the body
+        self.protected = HELD  # chains that are kept out of the body
         self.quiet = False  # nothing was commanded, and no limp joint gave way, in the last tick
         self.targets = body.angles()
         self.stiffness = dict.fromkeys(BODY, 1.0)
@@ -170,7 +170,7 @@ class Motion:
 
     def protect(self, side: str, on: bool) -> None:
         """Whether an arm ("L" or "R") is kept out of the body."""
-        self.protected = self.protected | {side} if on else self.protected - {side}
+        self.protected = self.protected | {f"{side}Arm"} if on else self.protected - {f"{side}Arm"}
 
     def collapse(self) -> None:
         """End all movement and remove the stiffness at once."""
@@ -223,10 +223,10 @@ class Motion:
 
     def _follow(self) -> None:
         wanted = {name: angle for name, angle in self._tracks.angles(self._now).items() if self.stiffness[name] > 0}
-        for side in self.protected:
-            arm = wanted.keys() & CHAINS[f"{side}Arm"]
-            if arm and self._change is None and held(side, self.targets, self.targets | wanted):
-                wanted = {name: angle for name, angle in wanted.items() if name not in arm}
+        for chain in self.protected:
+            moved = wanted.keys() & CHAINS[chain]
+            if moved and self._change is None and held(chain, self.targets, self.targets | wanted):
+                wanted = {name: angle for name, angle in wanted.items() if name not in moved}
         self._moved = self._moved or bool(wanted)
         self.targets.update(wanted)
         self._tracks.arrive(self._now)

@@ -1,4 +1,7 @@
-"""Keeps arms out of torso, head and legs: the body as balls and rods (NAOqi's self-collision avoidance does the same). Pure; m."""
+"""Keeps arms out of torso, head and legs, and one leg out of the other: the body as balls and rods. Pure; m.
+
+NAOqi's self-collision avoidance does the same for arms; a real robot's legs stop at each other.
+"""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -35,28 +38,41 @@ _ARMS = {
     ]
     for side in SIDES
 }
-_RODS = [*_TRUNK, *_ARMS["L"], *_ARMS["R"]]
+# A foot is its two edges, and as narrow as the heel, so that Crouch, where heels are near each other, is free.
+_LEGS = {
+    side: [
+        Rod(f"{side}KneePitch", (0.0, 0.0, -0.02), (0.0, 0.0, -0.08), 0.03),
+        *(Rod(f"{side}AnkleRoll", (-0.02, y, -0.03), (0.07, y, -0.03), 0.015) for y in (middle - 0.022, middle + 0.022)),
+    ]
+    for side, middle in (("L", 0.0035), ("R", -0.0035))
+}
+# Each chain of joints that is held, its rods, and those that they must not come into.
+_APART: dict[str, tuple[list[Rod], list[Rod]]] = {
+    "LArm": (_ARMS["L"], [*_TRUNK, *_ARMS["R"]]),
+    "RArm": (_ARMS["R"], [*_TRUNK, *_ARMS["L"]]),
+    "Legs": (_LEGS["L"], _LEGS["R"]),
+}
+HELD = frozenset(_APART)
 
 
-def depth(side: str, angles: Mapping[str, float]) -> float:
-    """How deep an arm is in the rest of the body; below 0: how far it is from it."""
+def depth(chain: str, angles: Mapping[str, float]) -> float:
+    """How deep an arm is in the rest of the body, or one of the "Legs" in the other; below 0: how far it is from it."""
     places: dict[str, Placement] = {}
-    for rod in _RODS:
+
+    def line(rod: Rod) -> tuple[Array, Array]:
         if rod.frame not in places:
             places[rod.frame] = in_torso(FRAMES[rod.frame], angles)
-    lines: list[tuple[Rod, Array, Array]] = []
-    for rod in _RODS:
         rotation, position = places[rod.frame]
-        lines.append((rod, position + rotation @ rod.start, position + rotation @ rod.end))
-    mine = [line for line in lines if line[0] in _ARMS[side]]
-    rest = [line for line in lines if line[0] not in _ARMS[side]]
+        return position + rotation @ rod.start, position + rotation @ rod.end
+
+    mine, rest = ([(rod, *line(rod)) for rod in rods] for rods in _APART[chain])
     return max(one.radius + another.radius - _distance(a, b, c, d) for one, a, b in mine for another, c, d in rest)
 
 
-def held(side: str, before: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
-    """Whether an arm shall stay as it is, since it would come into the body on its way from `before` to `wanted`."""
-    deep = depth(side, wanted)
-    return deep > _DEEP and deep > depth(side, before)
+def held(chain: str, before: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
+    """Whether a chain of HELD shall stay as it is, since it would come into the body on its way from `before` to `wanted`."""
+    deep = depth(chain, wanted)
+    return deep > _DEEP and deep > depth(chain, before)
 
 
 def _distance(a: Array, b: Array, c: Array, d: Array) -> float:
