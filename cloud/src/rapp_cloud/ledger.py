@@ -190,10 +190,10 @@ class Ledger:
         newest |= {path.removesuffix(".json"): meta.version for path, meta in lists.snapshot.meta.items()}
         last = (datetime.now(UTC) - _KEPT).timestamp()
         for name, version in newest.items():
-            old = [(int(path.name.split(".")[0]), path) for path in self.folder.glob(f"[0-9]*.{name}.json")]
-            written = {number: path.stat().st_mtime for number, path in old}
-            for number, path in old:
-                if number < version and written.get(number + 1, last) < last:
+            found = sorted((int(path.name.split(".")[0]), path) for path in self.folder.glob(f"[0-9]*.{name}.json"))
+            written = [path.stat().st_mtime for _, path in found]
+            for (number, path), followed in zip(found, written[1:], strict=False):  # a resumed store leaves numbers out
+                if number < version and followed < last:
                     path.unlink()
 
     def _settle_believed(self, lists: Lists, name: str) -> None:

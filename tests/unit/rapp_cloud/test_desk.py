@@ -343,9 +343,12 @@ def test_a_list_that_has_expired_is_followed_by_another(
     assert offered(robot) == ["1.0.0"]
 
 
-def test_lists_of_old_go(shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path: Path) -> None:
+@pytest.mark.parametrize("resumed", [False, True], ids=["in a row", "numbered anew"])
+def test_lists_of_old_go(shelf: Shelf, maria: Publisher, robot: TrustedStore, tmp_path: Path, resumed: bool) -> None:
     for version in ("1.0.0", "1.1.0"):
         hand_in(shelf, maria, package(tmp_path, version=version))
+    if resumed:
+        shelf.custody.resume()
     before = {path.name for path in shelf.metadata.iterdir()}
     shelf.refresh()
     assert {path.name for path in shelf.metadata.iterdir()} == before  # robots may still look at them
@@ -353,7 +356,8 @@ def test_lists_of_old_go(shelf: Shelf, maria: Publisher, robot: TrustedStore, tm
         os.utime(path, times=(0, 0))
     shelf.refresh()
     newest = shelf._ledger.read()
-    lists = {"snapshot": newest.snapshot, "targets": newest.targets, **newest.publishers, "root": newest.root}
+    lists = {"snapshot": newest.snapshot, "targets": newest.targets, **newest.publishers}
     wanted = {f"{one.version}.{name}.json" for name, one in lists.items()}
+    wanted |= {f"{number}.root.json" for number in range(1, newest.root.version + 1)}
     assert {path.name for path in shelf.metadata.iterdir()} == {*wanted, "timestamp.json"}
     assert offered(robot) == ["1.0.0", "1.1.0"]
