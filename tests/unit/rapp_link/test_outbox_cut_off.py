@@ -91,7 +91,7 @@ def story(outbox: Outbox, server: Server) -> None:
     while letter.state == "queued":
         letter = letter.after(server.answer(outbox.content(letter)))
         outbox.update(letter)
-    outbox.told(IDENTITY, late=True)
+    outbox.told(IDENTITY, (ANNA,), late=True)
 
 
 def unfinished(folder: Path) -> list[Path]:
