@@ -5,6 +5,7 @@ import pytest
 from fakes.agents import FakeAgent, Script
 from fakes.core_home import KEYWORD, LONG, Home, ask
 from fakes.rapps import install_rapp
+from fakes.robot import FakeVoice
 from rapp_core.control.refusals import not_delivered
 from rapp_core.errors import Refused
 from rapp_core.ports import Undelivered
@@ -70,6 +71,19 @@ def test_late_news_that_cannot_be_said_waits_and_the_link_hears_nothing_of_it(ho
     home.link.answers["mail_told"] = {"told": True}
     home.step_until(lambda: "mail_told" in home.link.names())
     assert home.fake.said()[-1] == not_delivered(("e@home.example",))
+
+
+def test_a_robot_that_cannot_say_its_late_news_listens_on(home: Home, monkeypatch: pytest.MonkeyPatch) -> None:
+    def say(_voice: FakeVoice, _text: str, _language: str) -> None:
+        raise Refused("cannot say it: the loudspeaker is broken")
+
+    home.start()
+    monkeypatch.setattr(FakeVoice, "say", say)
+    home.link.undelivered = Undelivered("<1@nao>", ("e@home.example",))
+    begun = home.clock.time
+    for _ in range(3):
+        home.machine.step(home.share)
+    assert home.clock.time - begun > home.config.listening_round
 
 
 # ways through

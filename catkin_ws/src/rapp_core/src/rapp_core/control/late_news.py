@@ -20,16 +20,16 @@ class LateNews:
         self._hop = hop
         self._say = say
         self._said: set[Undelivered] = set()  # the link may not have noted it yet
+        self._tried: Undelivered | None = None
 
     @property
     def waits(self) -> bool:
-        """Whether there is something to say."""
-        mail = self._hop.undelivered
-        return mail is not None and mail not in self._said
+        """Whether there is something to say that was not tried to be said just before: a robot that cannot speak listens on."""
+        return self._hop.undelivered not in (None, self._tried)
 
     def tell(self) -> None:
         """Say what there is; what could not be said stays for the next time."""
-        mail = self._hop.undelivered
+        mail = self._tried = self._hop.undelivered
         if mail is None:
             return
         if mail not in self._said:
