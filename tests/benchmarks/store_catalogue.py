@@ -14,11 +14,12 @@ from tuf.api.metadata import TargetFile  # type: ignore[attr-defined]  # public,
 
 from benchmarks.store_stage import Platform, clock, cpu, family, memory, share, write_rapp
 from benchmarks.store_words import invented
-from rapp_cloud.custody import add_publisher, delegated, pattern
 from rapp_cloud.keys import KeyRing
 from rapp_cloud.ledger import Ledger
+from rapp_cloud.register import add_publisher, delegated
 from rapp_hop.client import HopClient
 from rapp_hop.hz.archive import build, package_file_name
+from rapp_hop.hz.standing import pattern
 
 MEANT = ("winter_song", ["sing the winter song for me", "would you sing my winter song", "I want you to sing a winter song"])
 PUBLISHERS = 100  # who share the RApps

@@ -8,15 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from securesystemslib.signer import Key
-from tuf.api.metadata import DelegatedRole, Delegations, Targets  # type: ignore[attr-defined]
-
-from rapp_cloud.judge import judge
 from rapp_cloud.keys import ROLES, ROOTS
 from rapp_cloud.ledger import Ledger, Lists
+from rapp_cloud.register import add_publisher, admit, delegated, follow, owner_of, revoked_of
 from rapp_hop.errors import Refused
 from rapp_hop.hz.application import Application
-from rapp_hop.hz.standing import KNOWN, RESTORED, REVOKED, YANKED, Standing, package_of, pattern
+from rapp_hop.hz.standing import RESTORED, REVOKED, package_of, pattern
 from rapp_hop.hz.text import check_name
 
 _ROOTS = 8  # written at a resumption: robots may have seen some after the back-up
@@ -51,7 +48,7 @@ class Custody:
         for name, role in sorted(delegated(lists).items()):
             names = tuple(package_of(path) for path in role.paths or ())
             found.append(Holder(name, tuple(role.keyids), lists.publishers[name].expires, name in here, names))
-        gone = _revoked(lists)
+        gone = revoked_of(lists)
         return [*found, *(Holder(name, (), None, False, tuple(gone[name]["names"])) for name in sorted(gone))]
 
     def publishers(self) -> list[Holder]:
@@ -144,7 +141,7 @@ class Custody:
                 raise Refused(f"cannot revoke the key of {publisher}: it has none, see ./rapp keys list")
             names = [package_of(path) for path in role.paths or ()]
             lists.targets.unrecognized_fields[REVOKED] = {
-                **_revoked(lists), publisher: {"keyids": list(role.keyids), "names": names},
+                **revoked_of(lists), publisher: {"keyids": list(role.keyids), "names": names},
             }  # fmt: skip
             for keyid in list(role.keyids):
                 lists.targets.revoke_key(keyid, publisher)
@@ -218,96 +215,3 @@ class Custody:
             lists.targets.revoke_key(keyid, name)
         lists.targets.add_key(new.public_key, name)
         self._ledger.write(lists, ["targets", name])
-
-
-def add_publisher(ledger: Ledger, lists: Lists, publisher: str) -> Targets:
-    """Make a publisher's key and empty list among `lists`, not written yet. See `Custody.add`."""
-    signer = ledger.prepare(lists, publisher)
-    _delegate(lists, publisher, signer.public_key)
-    own = Targets()
-    known = lists.snapshot.meta.get(f"{publisher}.json")
-    own.version = known.version if known else 0
-    if known:  # its packages stay known, so that no version comes back with other bytes
-        old = ledger.list_of(publisher, known.version)
-        before = own.unrecognized_fields[YANKED] = Standing(publisher, lists.targets, old).known
-        lists.targets.unrecognized_fields.setdefault(KNOWN, {})[publisher] = before  # for robots that were away meanwhile
-    lists.publishers[publisher] = own
-    return own
-
-
-def admit(ledger: Ledger, lists: Lists, application: Application) -> dict[str, bytes]:
-    """Put a publisher who keeps their own key among `lists`; return their list, as signed, to be written.
-
-    :raises HopError: when the key was revoked, or the list is not an empty one with the right number
-    """
-    publisher, key = application.publisher, application.key
-    if key.keyid in _revoked(lists).get(publisher, {}).get("keyids", ()):
-        raise Refused(f"cannot take this key: it was revoked, have {publisher} make another with ./rapp keys own --anew")
-    known = lists.snapshot.meta.get(f"{publisher}.json")
-    last = known.version if known else 0
-    if application.own.version != last + 1:
-        again = f"./rapp keys own {publisher} --after {last}"
-        raise Refused(f"cannot take list {application.own.version} of {publisher}: {last + 1} comes next, have them run {again}")
-    _delegate(lists, publisher, key)
-    before = Standing(publisher, lists.targets, ledger.list_of(publisher, last)).known if known else {}
-    lists.targets.unrecognized_fields.get(KNOWN, {}).pop(publisher, None)  # an empty list cannot have it
-    empty = Targets()
-    empty.version = last
-    change = judge(Standing(publisher, lists.targets, empty), application.data, datetime.now(UTC))
-    if change.added is not None:
-        raise Refused(f"cannot take the list of {publisher}: it must be empty, have them run ./rapp keys own {publisher}")
-    if before:
-        lists.targets.unrecognized_fields.setdefault(KNOWN, {})[publisher] = before
-    lists.publishers[publisher] = change.own
-    return {publisher: application.data}
-
-
-def follow(lists: Lists, application: Application) -> dict[str, bytes]:
-    """Put a new key in the place of a publisher's, with the list on offer signed by it; return that list, to be written.
-
-    :raises HopError: when the list is another
-    """
-    publisher, own = application.publisher, lists.publishers[application.publisher]
-    for keyid in list(delegated(lists)[publisher].keyids):
-        lists.targets.revoke_key(keyid, publisher)
-    lists.targets.add_key(application.key, publisher)
-    change = judge(Standing(publisher, lists.targets, own), application.data, datetime.now(UTC))
-    if change.added is not None or change.withdrawn:
-        raise Refused(f"cannot take the list of {publisher}: it must have the packages on offer, have them make it again")
-    lists.publishers[publisher] = change.own
-    return {publisher: application.data}
-
-
-def _delegate(lists: Lists, publisher: str, key: Key) -> None:
-    """Name a publisher and their key; names that were theirs are theirs again."""
-    before = _revoked(lists).pop(publisher, None)
-    if lists.targets.delegations is None:
-        lists.targets.delegations = Delegations({}, {})
-    paths = [pattern(name) for name in before["names"]] if before else []
-    delegated(lists)[publisher] = DelegatedRole(publisher, [], 1, True, paths)
-    lists.targets.add_key(key, publisher)
-
-
-def delegated(lists: Lists) -> dict[str, DelegatedRole]:
-    """Return the publishers' delegations, to be read or changed."""
-    delegations = lists.targets.delegations
-    return {} if delegations is None or delegations.roles is None else delegations.roles
-
-
-def owner_of(lists: Lists, name: str) -> str | None:
-    """Return the publisher that a package name belongs to, None for nobody's.
-
-    :raises Refused: when that publisher's key was revoked
-    """
-    for publisher, role in delegated(lists).items():
-        if pattern(name) in (role.paths or ()):
-            return publisher
-    for publisher, entry in _revoked(lists).items():
-        if name in entry["names"]:
-            raise Refused(f"cannot publish {name}: it is {publisher}'s, whose key was revoked; make a new one for them first")
-    return None
-
-
-def _revoked(lists: Lists) -> dict[str, dict[str, list[str]]]:
-    found: dict[str, dict[str, list[str]]] = lists.targets.unrecognized_fields.setdefault(REVOKED, {})
-    return found

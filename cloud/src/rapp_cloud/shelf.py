@@ -1,7 +1,7 @@
 """The store's shelf: RApp packages as targets of a TUF repository, signed here, served as plain files.
 
 Folders: `metadata/` and `targets/`, which robots see. All writes happen under a lock, for `rapp_cloud publish` may run
-beside the server. Blocking. Who signs what: `ledger`, `custody`, `keys`.
+beside the server. Blocking. Who signs what: `ledger`, `custody`, `register`, `keys`.
 """
 
 import hashlib
@@ -14,13 +14,14 @@ from pathlib import Path
 
 from tuf.api.metadata import TargetFile, Targets  # type: ignore[attr-defined]  # public, but not in __all__
 
-from rapp_cloud.custody import Custody, add_publisher, delegated, owner_of
+from rapp_cloud.custody import Custody
 from rapp_cloud.desk import Desk
 from rapp_cloud.files import write_whole
 from rapp_cloud.keys import ROLES, KeyRing, Passphrase
 from rapp_cloud.ledger import Expiry, Ledger, Lists
 from rapp_cloud.packages import PackageFiles
 from rapp_cloud.publishing import check_publication
+from rapp_cloud.register import add_publisher, delegated, owner_of
 from rapp_hop.errors import Invalid, Refused
 from rapp_hop.hz.archive import extract, inspect, package_file_name
 from rapp_hop.hz.manifest import Manifest, check_numbers
