@@ -105,13 +105,18 @@ class Commands:
     async def _drop_revoked(self, ticket: Ticket) -> list[str]:
         if self._delivery is None:
             return []
+        with untold():
+            look = asyncio.ensure_future(self._delivery.drop_revoked())
         try:
-            with untold():
-                async with asyncio.timeout(max(0.0, ticket.remaining - MARGIN)):
-                    return sorted(await self._delivery.drop_revoked())
-        except (HopError, TimeoutError) as error:
-            _log.warning("cannot see which keys were revoked: %s", error or "the store is too slow")
-            return []
+            await asyncio.wait([look], timeout=max(0.0, ticket.remaining - MARGIN))
+            if look.done():
+                return sorted(look.result())
+            _log.warning("cannot see in time which keys were revoked")
+        except (HopError, OSError) as error:
+            _log.warning("cannot see which keys were revoked: %s", error)
+        finally:
+            look.cancel()  # not waited for: its thread may wait for an installation
+        return []
 
     async def interpret(self, arguments: dict[str, Any], ticket: Ticket) -> Any:
         """{recording, language} → {rapp | null, confidence, text, candidates, choice}."""

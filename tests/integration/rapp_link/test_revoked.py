@@ -1,6 +1,9 @@
 """The list of RApps that the link brings tells what was revoked: with the real trust client and a store in a folder."""
 
 import asyncio
+import errno
+import fcntl
+import os
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +15,7 @@ from fakes.store_client import StoreClient
 from rapp_cloud.shelf import Shelf
 from rapp_hop.errors import Unreachable
 from rapp_hop.hz.delivery import Delivery
-from rapp_link.commands import Commands
+from rapp_link.commands import MARGIN, Commands
 from rapp_link.config import Config
 
 
@@ -71,6 +74,29 @@ def test_a_yanked_rapp_stays(robot: Robot) -> None:
     robot.shelf.yank("clock", "1.0.0")
     assert robot.lists()["revoked"] == []
     assert robot.rapps == {"hello", "clock"}
+
+
+def test_on_a_full_disk_the_list_comes_all_the_same(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    def replace(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    robot.shelf.custody.revoke("maria")
+    monkeypatch.setattr(os, "replace", replace)
+    assert robot.lists() == {"rapps": [], "revoked": []}
+    assert robot.rapps == {"hello", "clock"}
+
+
+def test_while_another_looks_at_the_store_the_list_comes_all_the_same(robot: Robot, tmp_path: Path) -> None:
+    ticket: Any = SimpleNamespace(remaining=MARGIN + 0.2)
+
+    async def story() -> dict[str, Any]:
+        with (tmp_path / "robot" / "trust" / ".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            async with asyncio.timeout(20):
+                answer: dict[str, Any] = await robot.commands.list_rapps({}, ticket)
+        return answer
+
+    assert asyncio.run(story()) == {"rapps": [], "revoked": []}
 
 
 def test_without_its_store_the_list_comes_all_the_same(robot: Robot, tmp_path: Path) -> None:

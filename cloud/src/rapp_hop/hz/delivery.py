@@ -91,6 +91,7 @@ class Delivery:
         One that runs goes too: its run has a copy. One of which another version has come meanwhile is left to the next look.
 
         :raises HopError: when the store cannot be believed or reached; nothing was removed then
+        :raises OSError: when the disk refuses what is to be noted of the store
         """
         here = await asyncio.to_thread(self._versions)
         if not here:
