@@ -1,6 +1,7 @@
 """What the platform itself sees of who did what, for the audit log: downloads by robots, and what was put on offer."""
 
 import getpass
+import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -54,4 +55,7 @@ def noting_offers(data: Path, shelf: Shelf, url: str | None) -> Iterator[None]:
 
 def operator() -> str:
     """Return who gives a command at the platform, for its audit log."""
-    return f"{getpass.getuser()} at the platform"
+    try:
+        return f"{getpass.getuser()} at the platform"
+    except (KeyError, OSError):  # an account without a name, as in a container; OSError from Python 3.13 on
+        return f"account {os.getuid()} at the platform"

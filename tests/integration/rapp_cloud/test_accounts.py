@@ -30,6 +30,7 @@ from rapp_cloud.database.engine import Database
 from rapp_cloud.memory import open_memory
 from rapp_cloud.quotas import DAY, Quotas
 from rapp_cloud.turnstile import BURST, Turnstile
+from rapp_cloud.witness import operator
 from rapp_hop.client import HopClient
 from rapp_hop.errors import Refused, Unreachable
 from rapp_hop.hz.delivery import Delivery
@@ -206,6 +207,13 @@ class Gate:
             return 1000 - len(refused)
 
         return asyncio.run(visits())
+
+
+def test_who_has_no_name_at_the_platform_has_a_number_in_its_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("LOGNAME", "USER", "LNAME", "USERNAME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os, "getuid", lambda: 2**31 - 7)
+    assert operator() == "account 2147483641 at the platform"
 
 
 def test_what_everybody_may_fetch_has_its_bounds_too(accounts: Accounts, clock: Clock) -> None:
