@@ -62,11 +62,11 @@ class NaoqiFeeling:
 
     def close(self) -> None:
         """See `body_ports.Feeling`."""
-        with self._lock:
+        with self._lock:  # to its end: sonars that somebody else wakes meanwhile are to stay awake
             sonar, self._sonar = self._sonar, None
-        if sonar is not None and self._connection.present:
-            with contextlib.suppress(CoreError):
-                self._connection.call("ALSonar", "unsubscribe", self._name)
+            if sonar is not None and self._connection.present:
+                with contextlib.suppress(CoreError):
+                    self._connection.call("ALSonar", "unsubscribe", self._name)
 
     def _wake(self) -> None:
         with self._lock:
