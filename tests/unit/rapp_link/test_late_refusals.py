@@ -4,13 +4,15 @@ import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from rapp_hop.errors import Refused
 from rapp_link import outbox as outbox_module
-from rapp_link.commands import sign_of_life
-from rapp_link.config import MailConfig
+from rapp_link.commands import Commands, sign_of_life
+from rapp_link.config import Config, MailConfig
 from rapp_link.letter import Letter, Outcome, from_json, to_json
 from rapp_link.message import Built, Mail, build
 from rapp_link.outbox import Outbox
@@ -110,6 +112,23 @@ def test_one_whose_sender_is_told_at_once_does_not_stay(outbox: Outbox, tmp_path
     letter = outbox.put(built(), ME, 0.0)
     outbox.update(letter.after(Outcome(refused={ANNA: NO})))
     outbox.told("<1@nao>", (ANNA, BERT), late=False)
+    assert outbox.untold() is None
+    assert contents(tmp_path) == 0
+
+
+def test_an_answer_may_be_lost_on_the_way_so_it_counts_as_told_when_its_asker_says_so(outbox: Outbox, tmp_path: Path) -> None:
+    mail = {"recipients": [ANNA], "subject": "subject", "body": "body", "attachment": "", "message_id": "<1@nao>"}
+    ticket: Any = SimpleNamespace(remaining=10.0)
+
+    async def story(postman: Postman) -> None:
+        parts: Any = (Config(tmp_path, mail=CONFIG), None, None, outbox, postman, None, None)
+        commands = Commands(*parts)
+        with pytest.raises(Refused, match=NO):
+            await commands.send_mail(mail, ticket)
+        assert known(outbox).untold == (ANNA,)
+        await commands.mail_told({"message_id": "<1@nao>", "recipients": [ANNA], "late": False}, ticket)
+
+    working(outbox, Server(Outcome(refused={ANNA: NO})), story)
     assert outbox.untold() is None
     assert contents(tmp_path) == 0
 
