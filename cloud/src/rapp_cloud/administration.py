@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from typing import TextIO
 
 from rapp_cloud.backup import back_up, passphrase_of, restore
 from rapp_cloud.config import load_config
@@ -106,12 +107,23 @@ def _token(make: Make, words: list[str]) -> int:
     options = parser.parse_args(words)
     life = options.days * 86400 if options.days else None
     with _memory(options) as memory:
-        handle = os.open(options.file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-        with os.fdopen(handle, "w") as file:
+        with _new_file(options.file) as file:
             file.write(memory.accounts.give(options.name, options.scope, life, rate=options.rate, quota=options.quota))
         memory.audit.add(operator(), "token", options.name, scopes=options.scope)
     print(f"{options.file} has a token of {options.name}")
     return 0
+
+
+@contextmanager
+def _new_file(path: Path) -> Iterator[TextIO]:
+    """A file for its owner alone, which must not be there before; none is left when the block fails."""
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+    try:
+        with os.fdopen(handle, "w") as file:
+            yield file
+    except BaseException:
+        path.unlink()
+        raise
 
 
 def _tokens(make: Make, words: list[str]) -> int:

@@ -60,7 +60,7 @@ class People:
         for one in (*(one for one in mine if one.person == person), *(one for one in mine if one.profile.name == person)):
             return one.profile
         names = ", ".join(one.person for one in mine) or "nobody"
-        raise Refused(f"cannot find {person[:70]!r}: {robot} serves {names}; rapp_cloud person serve changes that")
+        raise Refused(f"cannot find {person[:70]!r}: {robot} serves {names}; ./rapp cloud person serve changes that")
 
     def refresh(self) -> None:
         """See what other processes have changed since; the first time, everything.

@@ -92,6 +92,7 @@ def test_from_an_authors_desk_to_a_robot(
     source = str(tmp_path / "clock")
     assert maria.far(capsys, "publish", source) == 1 and "token" in maria.err  # there is none yet
     data = ("cloud", "--data", str(cloud.data))
+    assert maria.run(capsys, *data, "token", "maria", str(maria.token)) == 1 and not maria.token.exists()  # nobody of that name yet
     assert maria.run(capsys, *data, "account", "maria", "--role", "publisher", given="correct horse\n") == 0, maria.err
     assert maria.run(capsys, *data, "token", "maria", str(maria.token)) == 0, maria.err
     maria.wait_until_known()

@@ -59,7 +59,7 @@ def test_a_new_rapp_is_published_shown_and_yanked(desk: Desk, language: list[str
     assert "not in the store" in desk.refuses("store", "show", "nothing")
 
 
-@pytest.mark.parametrize("name", ["My", "../x", "a-b", "9a", ""])
+@pytest.mark.parametrize("name", ["My", "../x", "a-b", "9a", "", "stop"])
 def test_names_that_cannot_be(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["new", name]) == 2

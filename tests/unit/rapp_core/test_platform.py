@@ -94,6 +94,14 @@ def test_a_newer_offer_is_downloaded(platform: Platform, link: FakeLink, tmp_pat
     assert platform.runnable("clock") is None
 
 
+def test_a_newer_offer_is_asked_for_by_its_own_words_too(platform: Platform, link: FakeLink, tmp_path: Path) -> None:
+    install_rapp(tmp_path, "clock", keywords=("what time is it",))
+    link.catalogue[0] |= {"version": "1.1.0", "keywords": {"en": ["clock"]}}
+    platform.attempt()
+    known = platform.rapps()["clock"]
+    assert (known.version, set(known.keywords)) == ("1.0.0", {"what time is it", "clock"})
+
+
 def test_what_was_revoked_is_not_run_and_still_understood(platform: Platform, link: FakeLink, tmp_path: Path) -> None:
     for name in ("parrot", "owl"):
         install_rapp(tmp_path, name)

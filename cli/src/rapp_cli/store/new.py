@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rapp_cli.errors import UsageError
 from rapp_cli.store.place import told
+from rapp_hop.hz.manifest import STOP
 from rapp_hop.hz.text import check_name
 
 _PYTHON = '''"""{title}: say here what it does."""
@@ -67,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError(f"cannot make {folder}: it is there already")
     language = _LANGUAGES[options.javascript]
     spoken = " ".join(name.split("_"))
+    if spoken in STOP.values():
+        raise UsageError(f"cannot make {name}: that is what one says to stop the robot; give another name")
     folder.mkdir(parents=True)
     (folder / "package.json").write_text(json.dumps(_manifest(name, spoken, language), indent=2) + "\n")
     title = "".join(word.capitalize() for word in name.split("_"))

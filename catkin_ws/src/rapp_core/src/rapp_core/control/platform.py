@@ -42,8 +42,12 @@ class Platform:
             self._thread.join(1)
 
     def rapps(self) -> dict[str, Known]:
-        """All RApps that can be asked for, by name; the installed form of one goes before the offered one."""
-        return {**self._revoked, **self._offered, **self._installed()}
+        """All RApps that can be asked for, by name; the installed form of one, by the words of the offered one too."""
+        here, offered = self._installed(), self._offered
+        for name in here.keys() & offered.keys():
+            words = dict.fromkeys((*offered[name].keywords, *here[name].keywords))
+            here[name] = replace(here[name], keywords=tuple(words))
+        return {**self._revoked, **offered, **here}
 
     def runnable(self, name: str) -> Known | None:
         """The installed RApp when the platform offers no other version of it; it can be run without a download."""
