@@ -74,7 +74,7 @@ param = roslibpy.Param(ros, "/from_roslibpy/param"); param.delete()
 assert param.get() is None
 found, servers = threading.Event(), []
 ros.get_action_servers(lambda answer: (servers.extend(answer["action_servers"]), found.set()))
-assert found.wait(10) and servers == ["/workshop/count"], servers
+assert found.wait(10) and "/workshop/count" in servers, servers
 ros.terminate()
 """
 

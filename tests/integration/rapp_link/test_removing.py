@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,9 +16,9 @@ from rapp_core.control.quarantine import Quarantine
 
 
 @pytest.fixture
-def home(start: Callable[..., Any], tmp_path: Path) -> Home:
+def home(start: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> Home:
     """A robot with bridge and link that trusts a store; the clock is installed, and has failed once."""
-    home = Home(tmp_path / "home")
+    home = Home(tmp_path_factory.mktemp("x"))  # a short path: a socket belongs to it
     home.make()
     open_shelf(home.cloud).create()
     bridge = start("rapp_bridge", "--port", "0").ready["port"]

@@ -25,7 +25,7 @@ await story(async (ros, statuses) => {
   assert.ok(details.publishing.includes("/workshop/out"));
   assert.ok(details.subscribing.includes("/workshop/in"));
   assert.ok(details.services.includes("/workshop/get_loggers"));
-  assert.deepEqual(await get("getActionServers"), ["/workshop/count"]);
+  assert.ok((await get("getActionServers")).includes("/workshop/count"));
   assert.ok((await get("getParams")).includes("/workshop/size"));
 
   const typedefs = await get("getMessageDetails", "geometry_msgs/PoseStamped");
