@@ -76,13 +76,14 @@ def test_memory_knows_when_a_key_was_set_and_what_it_is(memory, failing):
             getattr(memory, question)("none")
 
 
-def test_events_reach_subscribers_in_order_and_insertions_do_not(memory, events, wait_for):
+def test_each_event_reaches_its_subscribers_and_insertions_do_not(memory, events, wait_for):
+    """In what order is a matter of the threads with which the client's libqi calls back."""
     raised = events("count")
     memory.insertData("count", -1)
     for number in range(50):
         memory.raiseEvent("count", number)
     wait_for(lambda: len(raised) == 50)
-    assert [value for _key, value in raised] == list(range(50))
+    assert sorted(value for _key, value in raised) == list(range(50))
     assert memory.getData("count") == 49
 
 
