@@ -1,7 +1,7 @@
 """What the person has to be told although the run it comes from is over: a mail that was kept, and was then refused."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from rapp_core.control.refusals import not_delivered
 from rapp_core.errors import CoreError
@@ -10,6 +10,14 @@ from rapp_core.ports import Hop, Undelivered
 NOTED = 2.0  # s for the link to note that the person knows
 
 _log = logging.getLogger(__name__)
+
+
+def note_told(hop: Hop, message_id: str, recipients: Sequence[str], *, late: bool) -> None:
+    """Tell the link that the person knows of a refusal, later or at once; a link that does not take it is not waited for."""
+    try:
+        hop.request("mail_told", {"message_id": message_id, "recipients": list(recipients), "late": late}, NOTED)
+    except CoreError as error:
+        _log.warning("%s", error)
 
 
 class LateNews:
@@ -36,8 +44,4 @@ class LateNews:
             if not self._say(not_delivered(mail.recipients)):
                 return
             self._said.add(mail)
-        try:
-            told = {"message_id": mail.message_id, "recipients": list(mail.recipients), "late": True}
-            self._hop.request("mail_told", told, NOTED)
-        except CoreError as error:
-            _log.warning("%s", error)
+        note_told(self._hop, mail.message_id, mail.recipients, late=True)

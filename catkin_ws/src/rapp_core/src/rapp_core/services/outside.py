@@ -12,12 +12,12 @@ from typing import Any
 
 from rapp_core.config import Config
 from rapp_core.control.cloud_agent import CloudAgents
-from rapp_core.errors import NOT_KNOWN, CoreError, Invalid, Refused, Unreachable
+from rapp_core.control.late_news import note_told
+from rapp_core.errors import NOT_KNOWN, Invalid, Refused, Unreachable
 from rapp_core.ports import Agent, Hop
 from rapp_core.services.sendable import CallFile, Sendable
 
 MAIL_AGAIN = 0.5  # s between tries to hand a mail to a link that is away
-MAIL_TOLD = 2.0  # s for the link to note that its refusal has come
 
 _log = logging.getLogger(__name__)
 
@@ -95,8 +95,8 @@ class Outside:
             try:
                 return str(self._hop.request("send_mail", mail, left)["state"])
             except Refused:
-                if run.alive:
-                    self._told(mail)
+                if run.alive:  # otherwise the person is told later, by `control.late_news`
+                    note_told(self._hop, mail["message_id"], mail["recipients"], late=False)
                 raise
             except Unreachable as error:
                 may_have_it = may_have_it or error.reason == NOT_KNOWN
@@ -106,14 +106,6 @@ class Outside:
                         _log.warning("%s", error)
                         return "unknown"
                     raise
-
-    def _told(self, mail: dict[str, Any]) -> None:
-        """Tell the link that its refusal has come; otherwise the person is told later (`control.late_news`)."""
-        told = {"message_id": mail["message_id"], "recipients": mail["recipients"], "late": False}
-        try:
-            self._hop.request("mail_told", told, MAIL_TOLD)
-        except CoreError as error:
-            _log.warning("%s", error)
 
     @staticmethod
     def _allowed(run: Agent, service: str) -> None:
