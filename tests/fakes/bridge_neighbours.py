@@ -3,12 +3,13 @@
 import asyncio
 import json
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from tornado.websocket import WebSocketClientConnection, websocket_connect
+
+from fakes.told_node import told_node
 
 PATIENCE = 20.0  # s until a test gives up; nothing waits as long when all is well
 
@@ -79,13 +80,8 @@ class Peer:
 
 @contextmanager
 def node(ros_env: dict[str, str], name: str) -> Iterator[Peer]:
-    words = [sys.executable, "-c", NODE, name]
-    process = subprocess.Popen(words, env=ros_env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    try:
+    with told_node(ros_env, NODE, name) as process:
         yield Peer(process)
-    finally:
-        process.kill()
-        process.communicate()
 
 
 class Socket:

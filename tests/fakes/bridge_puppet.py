@@ -2,10 +2,11 @@
 
 import json
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+
+from fakes.told_node import told_node
 
 PUPPET = """
 import json, sys, threading, time, rospy
@@ -44,10 +45,5 @@ class Puppet:
 @contextmanager
 def puppet(ros_env: dict[str, str], name: str) -> Iterator[Puppet]:
     """A running puppet."""
-    words = [sys.executable, "-c", PUPPET, name]
-    process = subprocess.Popen(words, env=ros_env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    try:
+    with told_node(ros_env, PUPPET, name) as process:
         yield Puppet(process)
-    finally:
-        process.kill()
-        process.communicate()

@@ -5,7 +5,6 @@ import json
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from email.message import EmailMessage
@@ -14,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from fakes.told_node import told_node
 
 NODE = """
 import json, sys, time, rospy
@@ -104,13 +105,8 @@ class Asker:
 
 @pytest.fixture
 def asker(ros_env: dict[str, str]) -> Iterator[Asker]:
-    words = [sys.executable, "-c", NODE]
-    process = subprocess.Popen(words, env=ros_env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    try:
+    with told_node(ros_env, NODE) as process:
         yield Asker(process)
-    finally:
-        process.kill()
-        process.communicate()
 
 
 def mail_arguments(home: Path, message_id: str) -> dict[str, Any]:

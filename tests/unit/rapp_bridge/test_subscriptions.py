@@ -26,6 +26,13 @@ async def until(holds: Callable[[], object]) -> None:
             await asyncio.sleep(0.01)
 
 
+async def subscribe(held: subscriptions.Subscriptions, client: Any, kind: str) -> None:
+    """Subscribe to a topic that was not open, and wait until it is."""
+    waiting = held.subscribe(client, Subscribe("/topic", kind))
+    assert waiting is not None
+    await waiting
+
+
 @pytest.fixture
 def markers(monkeypatch: pytest.MonkeyPatch) -> list[Marker]:
     """The connections that rospy was told of."""
@@ -50,9 +57,7 @@ def test_a_publisher_that_registers_again_is_connected_to_though_the_old_link_s_
         master: Any = None
         client: Any = object()
         held = subscriptions.Subscriptions(Config(), master, Blocking(1))
-        waiting = held.subscribe(client, Subscribe("/topic", "std_msgs/String"))
-        assert waiting is not None
-        await waiting
+        await subscribe(held, client, "std_msgs/String")
         assert held.connect("/topic", PUBLISHER, address)
         await until(lambda: markers)
         markers[0].close()  # as rospy's thread does, while the loop is busy
@@ -70,9 +75,7 @@ def test_a_topic_that_nobody_wants_any_more_is_opened_anew_for_another_type() ->
         client: Any = object()
         held = subscriptions.Subscriptions(Config(), master, Blocking(1))
         for kind in ("std_msgs/String", "std_msgs/Int32"):
-            waiting = held.subscribe(client, Subscribe("/topic", kind))
-            assert waiting is not None
-            await waiting
+            await subscribe(held, client, kind)
             with pytest.raises(Invalid, match=f"it is {kind}"):
                 held.subscribe(client, Subscribe("/topic", "std_msgs/Float32"))
             held.unsubscribe(client, Unsubscribe("/topic"))
@@ -97,9 +100,7 @@ def test_a_connection_of_a_topic_that_was_opened_anew_meanwhile_is_closed(marker
         client: Any = object()
         held = subscriptions.Subscriptions(Config(), master, Blocking(1))
         for kind in ("std_msgs/String", "std_msgs/Int32"):
-            waiting = held.subscribe(client, Subscribe("/topic", kind))
-            assert waiting is not None
-            await waiting
+            await subscribe(held, client, kind)
             if not begun.is_set():
                 held.connect("/topic", PUBLISHER, server.sockets[0].getsockname())
                 await begun.wait()
