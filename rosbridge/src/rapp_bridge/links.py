@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from rapp_bridge.decoding import Raw
 from rapp_bridge.errors import BridgeError, Invalid, Unreachable
+from rapp_bridge.newest import Newest
 from rapp_bridge.tcpros import HeaderReader, Splitter, encode_header
 
 HIGH_WATER = 1 << 20  # bytes given to the system at once
@@ -103,10 +104,7 @@ class SubscriberLink(asyncio.Protocol):
     ) -> None:
         """At most `queue_size` messages and `limit` bytes wait; `dropped` is told when the bytes are too many."""
         self._transport = transport
-        self._queue_size = queue_size
-        self._limit = limit
-        self._waiting: deque[bytes] = deque()
-        self._size = 0  # bytes of what waits
+        self._waiting = Newest(queue_size, limit)
         self._is_paused = False
         self._lost = lost
         self._dropped = dropped
@@ -114,23 +112,12 @@ class SubscriberLink(asyncio.Protocol):
 
     def send(self, framed: bytes) -> None:
         """Send a message with its length in front."""
-        if self._is_paused:
-            self._keep(framed)
-        else:
+        if not self._is_paused:
             self._transport.write(framed)
-
-    def _keep(self, framed: bytes) -> None:
-        self._waiting.append(framed)
-        self._size += len(framed)
-        while len(self._waiting) > self._queue_size or (self._size > self._limit and len(self._waiting) > 1):
-            if len(self._waiting) <= self._queue_size:
-                self._dropped()
-            self._take()
-
-    def _take(self) -> bytes:
-        framed = self._waiting.popleft()
-        self._size -= len(framed)
-        return framed
+            return
+        _too_many, too_long = self._waiting.add(framed)
+        if too_long:
+            self._dropped()
 
     def data_received(self, data: bytes) -> None:
         """Subscribers say nothing after their header."""
@@ -143,7 +130,7 @@ class SubscriberLink(asyncio.Protocol):
         """It has caught up."""
         self._is_paused = False
         while self._waiting and not self._is_paused:
-            self._transport.write(self._take())
+            self._transport.write(self._waiting.take())
 
     def connection_lost(self, _error: Exception | None) -> None:
         """It is gone."""

@@ -2,7 +2,6 @@
 
 import asyncio
 import time
-from collections import deque
 from collections.abc import Awaitable
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,6 +18,7 @@ from rapp_bridge.errors import Invalid, Unreachable
 from rapp_bridge.forms import JSON
 from rapp_bridge.links import SubscriberLink, Welcome
 from rapp_bridge.master import Master
+from rapp_bridge.newest import Newest
 from rapp_bridge.node import Marker
 from rapp_bridge.protocol import Advertise, Publish, Unadvertise
 from rapp_bridge.rostypes import has_header, message_class
@@ -50,8 +50,7 @@ class _Published:
     warned: float = float("-inf")
 
     def __post_init__(self) -> None:
-        self.kept: deque[bytes] = deque()
-        self.kept_size = 0  # bytes
+        self.kept = Newest(1 if self.latch else self.queue_size, self.queue_limit)
         self.has_header = has_header(self.cls)
         self.keeps = True
 
@@ -73,13 +72,8 @@ class _Published:
             self.keeps = False
             self.kept.clear()
             return
-        self.kept.append(framed)
-        self.kept_size += len(framed)
-        most = 1 if self.latch else self.queue_size
-        while len(self.kept) > most or (self.kept_size > self.queue_limit and len(self.kept) > 1):
-            self.kept_size -= len(self.kept.popleft())
-            if self.awaited and not self.latch:
-                self.warn(f"until {', '.join(sorted(self.awaited))} has connected; the oldest are dropped")
+        if any(self.kept.add(framed)) and self.awaited and not self.latch:
+            self.warn(f"until {', '.join(sorted(self.awaited))} has connected; the oldest are dropped")
 
     @property
     def is_opening(self) -> bool:
