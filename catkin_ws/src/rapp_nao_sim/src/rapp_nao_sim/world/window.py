@@ -1,6 +1,7 @@
 """The window process: the mirrored world in pybullet's own window, to be looked at from all sides.
 
 Started by Onlooker as `python -m rapp_nao_sim.world.window FD`; it ends when its window is closed.
+pybullet lights its window by itself: the lamp's level shows on its shade alone, otherwise only in the robot's pictures.
 """
 
 import math
