@@ -97,11 +97,13 @@ def restore(data: Path, url: str | None, file: Path, passphrase: Passphrase | No
     try:
         listed = _unpack(file, aside)
         database.migrate(listed["revision"])
-        _fill(database, aside / "tables", listed["tables"])
-        database.migrate()
         for path in sorted((aside / "data").iterdir()):
             path.rename(data / path.name)
+        _fill(database, aside / "tables", listed["tables"])  # last, so that a database with rows is a whole one
+        database.migrate()
     except BaseException:
+        for name in KEPT:
+            _remove(data / name)
         if not database.server:
             for path in data.glob(f"{FILE}*"):
                 path.unlink()
@@ -110,6 +112,13 @@ def restore(data: Path, url: str | None, file: Path, passphrase: Passphrase | No
         shutil.rmtree(aside, ignore_errors=True)
         database.close()
     return _resumed(data, passphrase or Passphrase(), passphrase_of(file), float(listed["at"]))
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _resumed(data: Path, passphrase: Passphrase, given: Path, at: float) -> Restored:

@@ -27,11 +27,11 @@ def add_actions(parser: argparse.ArgumentParser) -> None:
 
     add = action("add", "Take a person in, with an account (a-z, 0-9, _).", _add, "person")
     add.add_argument("--name", required=True, help="what they are called")
-    add.add_argument("--language", default=LANGUAGE, help="what they speak (%(default)s)")
+    add.add_argument("--language", default=LANGUAGE, help="what they speak, in two letters (%(default)s)")
     add.add_argument("--robot", action="append", default=[], help="that serves them; may be repeated")
     edit = action("edit", "Change name or language.", _edit, "person")
     edit.add_argument("--name", help="what they are called")
-    edit.add_argument("--language", help="what they speak")
+    edit.add_argument("--language", help="what they speak, in two letters")
     show = action("show", "Show everybody, or one person with contacts.", _show)
     show.add_argument("person", nargs="?", metavar="PERSON")
     action("remove", "Forget a person, with account and tokens.", _remove, "person")

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from rapp_hop.errors import Invalid
-from rapp_hop.hz.text import check_text
+from rapp_hop.hz.text import check_language, check_text
 
 MAX_BYTES = 2**20  # of one profile
 MAX_CONTACTS = 100  # as many words as a robot listens for at once
@@ -45,7 +45,7 @@ def parse_profile(value: Any) -> Profile:
         raise Invalid(f"cannot read the profile: more than {MAX_CONTACTS} contacts")
     return Profile(
         check_text(_text(value, "name"), 100, "the profile's name"),
-        check_text(_text(value, "language"), 16, "the profile's language"),
+        check_language(_text(value, "language"), "the profile"),
         _apart([_contact(item) for item in contacts]),
     )
 

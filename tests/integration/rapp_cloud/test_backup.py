@@ -132,6 +132,7 @@ def test_a_database_that_is_not_empty_is_left_alone(database_url: str, tmp_path:
     with pytest.raises(Refused, match="not empty"):
         restore(tmp_path / "again", database_url, tmp_path / "backup")
     assert list((tmp_path / "again").iterdir()) == []
+    restore(tmp_path / "again", f"sqlite:///{tmp_path / 'other.sqlite'}", tmp_path / "backup")
 
 
 @pytest.mark.parametrize("damage", ["cut", "no gzip", "other bytes", "one more", "outside", "symlink", "newer"])

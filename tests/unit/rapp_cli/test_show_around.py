@@ -1,6 +1,8 @@
 """The demo's judgement of a tour: all pictures, back where it began, nothing touched."""
 
 import asyncio
+import os
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -55,13 +57,20 @@ def write(folder: Path, *names: str) -> None:
         cv2.imwrite(str(kept / name), PHOTO)
 
 
-def judged(folder: Path, ended: Sequence[float] = BEGUN, touched: Sequence[str] = (), obstacle: bool = False) -> tuple[int, Room]:
+def judged(
+    folder: Path, ended: Sequence[float] = BEGUN, touched: Sequence[str] = (), obstacle: bool = False, old: str = ""
+) -> tuple[int, Room]:
+    """The pictures that are there are those of this tour, but for the one that is `old`."""
+
     async def tour() -> tuple[int, Room]:
         timeline = Timeline()
         await timeline.add(Entry("core", "core", "s3", "entered", ""))
         room = Room(timeline, ended, touched)
         story = ShowAround(config(folder, obstacle), None)  # type: ignore[arg-type]
         await story.live(room, timeline)  # type: ignore[arg-type]
+        for path in (folder / "robot" / "keepsakes" / "show_around").iterdir():
+            taken = 1.0 if path.name == old else time.time() + 1  # a file system's clock goes in steps
+            os.utime(path, (taken, taken))
         return await story.judge(timeline), room
 
     return asyncio.run(tour())
@@ -80,6 +89,12 @@ def test_a_missing_picture_is_told(tmp_path: Path, capsys: pytest.CaptureFixture
     write(tmp_path, *[name for name in FILES if name != missing])
     assert judged(tmp_path)[0] == 1
     assert f"{missing} is missing" in capsys.readouterr().err
+
+
+def test_a_picture_that_another_run_left_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path, *FILES)
+    assert judged(tmp_path, old="lamp.jpg")[0] == 1
+    assert "rapp demo: lamp.jpg is missing" in capsys.readouterr().err
 
 
 def test_a_picture_of_nothing_is_none(tmp_path: Path) -> None:

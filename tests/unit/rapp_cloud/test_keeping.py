@@ -26,7 +26,7 @@ def test_h19_addresses_that_are_none(address: str) -> None:
 @pytest.mark.parametrize(
     "value",
     [[], {}, {"name": "M"}, {"name": "M", "language": "en", "contacts": {}}, {"name": "M", "language": "en", "contacts": ["x"]},
-     {"name": "M\n", "language": "en"}, {"name": 3, "language": "en"},
+     {"name": "M\n", "language": "en"}, {"name": 3, "language": "en"}, {"name": "M", "language": "english"},
      {"name": "M", "language": "en", "contacts": [{"name": "x"}]},
      {"name": "M", "language": "en", "contacts": [{"name": f"x{number}", "address": "a@b"} for number in range(101)]}],
 )  # fmt: skip

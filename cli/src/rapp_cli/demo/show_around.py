@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ class ShowAround:
         self._config = config
         self._kept = config.folder / "robot" / "keepsakes" / RAPP
         self._places: list[dict[str, Any]] = json.loads((STORE / RAPP / "package.json").read_text())["rapp"]["parameters"]["places"]
+        self._began = time.time()  # what is older was left in the folder by another run
         self._away = 0.0
         self._touched: list[str] = []
 
@@ -58,7 +60,7 @@ class ShowAround:
         print()
         for name in [f"{place['name']}.jpg" for place in self._places] + ["path.png"]:
             path = self._kept / name
-            there = _shows_something(path)
+            there = _shows_something(path, self._began)
             print(f"{'picture' if path.suffix == '.jpg' else 'path':<10} {path if there else f'{name} is missing'}")
             wrong += [] if there else [f"{name} is missing"]
         if self._config.robot is None:
@@ -70,6 +72,8 @@ class ShowAround:
         return 1 if wrong else 0
 
 
-def _shows_something(path: Path) -> bool:
+def _shows_something(path: Path, since: float) -> bool:
+    if not path.exists() or path.stat().st_mtime < since:
+        return False
     picture = cv2.imread(str(path))
     return picture is not None and float(picture.std()) > LEAST

@@ -12,7 +12,7 @@ from typing import Any, Literal, cast
 from rapp_hop import strict_json
 from rapp_hop.errors import Invalid
 from rapp_hop.hz.semver import Version, check_condition, parse_version, satisfies
-from rapp_hop.hz.text import NAME, check_name, check_text
+from rapp_hop.hz.text import NAME, check_language, check_name, check_text
 
 MAX_BYTES = 256 * 1024  # of package.json
 MAX_DEPTH = 6  # containers inside containers
@@ -198,8 +198,7 @@ def _phrases(rapp: Mapping[str, Any], key: str, limit: int) -> Mapping[str, tupl
     if len(languages) > MAX_LANGUAGES:
         raise Invalid(f"cannot read package.json: rapp.{key} has more than {MAX_LANGUAGES} languages")
     for language in languages:
-        if not (len(language) == 2 and language.isascii() and language.islower() and language.isalpha()):
-            raise Invalid(f"cannot use the language {language[:20]!r} in rapp.{key}: write two letters such as en")
+        check_language(language, f"rapp.{key}")
     where = f"rapp.{key}"
     return {
         language: tuple(check_text(item, limit, f"{where}.{language}") for item in _texts(languages, language, where))

@@ -19,6 +19,16 @@ def check_name(name: str) -> str:
     return name
 
 
+def check_language(language: str, where: str) -> str:
+    """Return `language` when it is one in two letters, as in ISO 639-1.
+
+    :raises Invalid: when it is not; `where` it stands is told
+    """
+    if not (len(language) == 2 and language.isascii() and language.islower() and language.isalpha()):
+        raise Invalid(f"cannot use the language {language[:20]!r} in {where}: write two letters such as en")
+    return language
+
+
 def check_text(text: str, limit: int, what: str) -> str:
     """Return `text` when a person may see or hear it.
 

@@ -62,6 +62,7 @@ class Platform:
             if not self._registered:
                 self._hop.request("register", robot, config.register_timeout)
                 self._registered = True
+                _log.info("registered with the platform as %s", config.name)
             here = installed(config.home, config.language)
             catalogue = self._hop.request("list_rapps", {}, config.register_timeout)
             known = map(self._known, catalogue["rapps"])
