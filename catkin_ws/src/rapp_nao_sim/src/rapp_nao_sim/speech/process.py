@@ -113,4 +113,4 @@ def _build(service: Service) -> Callable[[], None]:
 
 
 if __name__ == "__main__":
-    sys.exit(serve(_build, sys.argv))
+    serve(_build, sys.argv)

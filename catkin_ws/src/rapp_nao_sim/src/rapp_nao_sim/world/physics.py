@@ -208,4 +208,4 @@ def _pick(values: dict[str, float], names: Sequence[str]) -> list[float]:
 
 
 if __name__ == "__main__":
-    sys.exit(serve(lambda service: Physics(service).run, sys.argv))
+    serve(lambda service: Physics(service).run, sys.argv)

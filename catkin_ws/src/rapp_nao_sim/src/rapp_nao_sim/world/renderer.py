@@ -110,4 +110,4 @@ class Renderer:
 
 
 if __name__ == "__main__":
-    sys.exit(serve(lambda service: Renderer(service).run, sys.argv))
+    serve(lambda service: Renderer(service).run, sys.argv)

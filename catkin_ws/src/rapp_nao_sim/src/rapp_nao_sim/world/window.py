@@ -60,4 +60,4 @@ class Window:
 if __name__ == "__main__":
     with Path(os.devnull).open("w") as nowhere:
         os.dup2(nowhere.fileno(), 1)  # pybullet's window tells its whole life there
-    os._exit(serve(lambda service: Window(service).run, sys.argv))  # at once: pybullet takes long to undo its window
+    serve(lambda service: Window(service).run, sys.argv)

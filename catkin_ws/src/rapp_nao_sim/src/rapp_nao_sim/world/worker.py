@@ -16,11 +16,11 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, NoReturn
 
 from rapp_nao_sim.world.errors import Bug, Refused, Unreachable, WorldError
 
-STOP_TIMEOUT = 0.3  # s, for a child to end by itself; it has nothing to tidy up, and three are to end within 2 s
+STOP_TIMEOUT = 0.3  # s, for a child to end by itself; three are to end within 2 s
 SEND_TIMEOUT = 5  # s, for a child to take a request from the line
 CALL_TIMEOUT = 5.0  # s, for an answer that needs no movement
 
@@ -174,13 +174,17 @@ class Service:
             raise EOFError from None
 
 
-def serve(build: Callable[[Service], Callable[[], None]], words: list[str]) -> int:
-    """Run a child: `build` makes its parts and gives what to run until the parent leaves; gives the exit status."""
+def serve(build: Callable[[Service], Callable[[], None]], words: list[str]) -> NoReturn:
+    """Run a child: `build` makes its parts and gives what to run until the parent leaves; the process ends with it.
+
+    It ends at once, having nothing to tidy up: on a busy machine an interpreter with pybullet in it takes longer than STOP_TIMEOUT.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends us, after it has ended what needs us
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s", stream=sys.stderr)
+    status = 1
     with Connection(int(words[1])) as line:
         try:
             build(Service(line))()
         except EOFError:
-            return 0
-    return 1
+            status = 0
+    os._exit(status)
