@@ -103,7 +103,8 @@ def restore(data: Path, url: str | None, file: Path, passphrase: Passphrase | No
         database.migrate()
     except BaseException:
         for name in KEPT:
-            _remove(data / name)
+            if (data / name).exists():
+                (data / name).rename(aside / name)
         if not database.server:
             for path in data.glob(f"{FILE}*"):
                 path.unlink()
@@ -112,13 +113,6 @@ def restore(data: Path, url: str | None, file: Path, passphrase: Passphrase | No
         shutil.rmtree(aside, ignore_errors=True)
         database.close()
     return _resumed(data, passphrase or Passphrase(), passphrase_of(file), float(listed["at"]))
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
 
 
 def _resumed(data: Path, passphrase: Passphrase, given: Path, at: float) -> Restored:

@@ -197,9 +197,9 @@ def _phrases(rapp: Mapping[str, Any], key: str, limit: int) -> Mapping[str, tupl
     languages = _object(rapp, key, "rapp")
     if len(languages) > MAX_LANGUAGES:
         raise Invalid(f"cannot read package.json: rapp.{key} has more than {MAX_LANGUAGES} languages")
-    for language in languages:
-        check_language(language, f"rapp.{key}")
     where = f"rapp.{key}"
+    for language in languages:
+        check_language(language, where)
     return {
         language: tuple(check_text(item, limit, f"{where}.{language}") for item in _texts(languages, language, where))
         for language in languages
