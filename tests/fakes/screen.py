@@ -48,4 +48,7 @@ def a_screen(folder: Path) -> Iterator[Screen]:
         yield Screen(process, f":{name}", folder / "Xvfb_screen0")
     finally:
         process.terminate()
-        process.wait(READY)
+        try:
+            process.wait(READY)
+        finally:
+            process.kill()
